@@ -131,7 +131,10 @@ def _words(hint: Any) -> tuple[str, ...]:
 
 def _options(hint: Any) -> Iterator[Any]:
     """Yield the alternatives of a union, or the annotation itself."""
-    if get_origin(hint) is Annotated:
+    alias = getattr(get_origin(hint) or hint, "__value__", None)  # of `type`, as numpy.NDArray is
+    if alias is not None:
+        yield from _options(alias)
+    elif get_origin(hint) is Annotated:
         yield from _options(get_args(hint)[0])
     elif get_origin(hint) in (Union, types.UnionType):
         for one in get_args(hint):

@@ -108,6 +108,17 @@ def in_system(unit: str, system: System = "si") -> Shown:
     return Shown(text[1:-1] if text == "(lb/ft²)" else text, factor)
 
 
+def pressure_shown(system: System = "si") -> Shown:
+    """Return what a dynamic pressure in Pa is written in: kPa, or lb/ft²."""
+    return Shown("kPa", 1e-3) if system == "si" else in_system("Pa", system)
+
+
+def pressure_in(pressure_Pa: float, system: System = "si", digits: int = 2) -> str:
+    """Return a dynamic pressure as text, with so many decimals in kPa."""
+    unit = pressure_shown(system)
+    return f"{unit.factor * pressure_Pa:.{digits}f} {unit.unit}"
+
+
 def convert(value: float, unit: str, system: System = "si") -> float:
     """Return a quantity in the unit that `in_system` shows it in."""
     return in_system(unit, system).factor * value

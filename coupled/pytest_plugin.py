@@ -46,7 +46,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Prepare the report, where one is asked for; refuse one that is no HTML before any flight."""
+    """Prepare the requested report; refuse a file other than HTML before any flight."""
     file: Path | None = config.getoption("coupled_report")
     if file is None or hasattr(config, "workerinput"):  # a worker of xdist
         return

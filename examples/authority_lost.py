@@ -6,7 +6,14 @@
 # the feel is softer than specified. Both grow with the gradient, and so with dynamic pressure.
 
 # %%
+import argparse
+
 import coupled
+
+about = argparse.ArgumentParser(
+    description="What a bending column takes from a 737: compares a held pull with each correction."
+)
+about.parse_known_args()  # for --help
 
 rig = coupled.load_rig("737")
 for key in ("loader.bend_m_per_N", "travel_m"):

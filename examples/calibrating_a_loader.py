@@ -7,7 +7,14 @@
 # true values are known, with the errors of usual instruments.
 
 # %%
+import argparse
+
 import coupled
+
+about = argparse.ArgumentParser(
+    description="Takes readings on a virtual loader, finds S1, S3 and K from them, and flies both."
+)
+about.parse_known_args()  # for --help
 
 rig = coupled.load_rig("report-column").changed(
     {

@@ -5,7 +5,14 @@
 # is it? Here the real rig is one that we wear out ourselves, so that the answer is known.
 
 # %%
+import argparse
+
 import coupled
+
+about = argparse.ArgumentParser(
+    description="Wears out a rig, flies it, and finds from the record by which effect."
+)
+about.parse_known_args()  # for --help
 
 nominal = coupled.load_rig("t37")
 real = nominal.changed({"controls.column.loader.damping_N_s_per_m": 110.0, "noise": {}})

@@ -190,6 +190,7 @@ def test_a_flight_that_ends_early_says_so_and_exits_with_1(folder: Path) -> None
         (["compare", "short.toml", "--figure", "a.bmp"], "a.bmp: a figure ends in .png"),
         (["fly", "short.toml", "-o", "a.xls"], "a.xls: a record ends in .csv or .parquet"),
         (["fly", "short.toml", "--case", "x"], "--case: no case 'x'; known: short"),
+        (["compare", "short.toml", "--case", "x"], "--case: no case 'x'; known: short"),
         (["fly", "short.toml", "--configuration", "rigd"], "did you mean rigid?"),
         (["plot", "short.toml"], "a record ends in .csv or .parquet"),
         (["plot", "none.csv"], "none.csv: cannot be read"),

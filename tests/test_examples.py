@@ -19,6 +19,18 @@ def test_every_example_is_run_here() -> None:
         assert path.read_text(encoding="utf-8").startswith("# %% [markdown]\n# # "), path
 
 
+@pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.py")), ids=lambda path: path.stem)
+def test_help_says_what_an_example_does(
+    path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sys.argv", [path.name, "--help"])
+    with pytest.raises(SystemExit) as ended:
+        runpy.run_path(str(path))
+    assert ended.value.code == 0
+    said = capsys.readouterr().out
+    assert f"usage: {path.name}" in said and len(said.split()) > 15
+
+
 def test_the_example_authority_lost_prints_the_closed_form(
     capsys: pytest.CaptureFixture[str],
 ) -> None:

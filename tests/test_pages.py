@@ -56,9 +56,9 @@ def trimmed(text: str) -> str:
 
 
 def prepare(folder: Path) -> None:
-    """Give a folder the files that the README's commands name."""
-    for source in ("tests/data/typo.toml", "tests/data/loose.toml"):
-        (folder / Path(source).name).write_bytes((ROOT / source).read_bytes())
+    """Give a folder the files that the pages' commands name."""
+    for name in ("typo.toml", "floor.csv", "yoke-readings.csv"):
+        (folder / name).write_bytes((ROOT / "tests" / "data" / name).read_bytes())
 
 
 @pytest.fixture(scope="module")
@@ -83,6 +83,12 @@ def test_a_command_prints_what_the_page_says(
     page: Path, command: str, output: str, folders: dict[Path, Path]
 ) -> None:
     assert run(command, folders[page]) == trimmed(output)
+
+
+def test_what_a_new_user_does_takes_six_commands_at_most() -> None:
+    for page in PAGES:
+        for block in BLOCK.findall(page.read_text(encoding="utf-8")):
+            assert len(re.findall(r"^\$ ", block, re.M)) <= 6, page
 
 
 @pytest.mark.slow

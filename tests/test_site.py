@@ -80,7 +80,8 @@ def test_the_site_builds_without_a_warning_and_its_links_lead_somewhere(tmp_path
         for link in found.links | found.loads:
             parts = urlsplit(link)
             if parts.scheme or link.startswith("//"):
-                assert link not in found.loads, f"{page.name} loads {link}"
+                embedded = parts.scheme == "data"  # as an image within a figure
+                assert embedded or link not in found.loads, f"{page.name} loads {link[:80]}"
                 continue
             target = (page.parent / unquote(parts.path)).resolve() if parts.path else page
             assert target.is_file(), f"{page.name}: {link}"

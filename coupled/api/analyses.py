@@ -8,7 +8,7 @@ from os import PathLike
 from coupled.api.records import Given, named_records
 from coupled.api.rigs import rig_given
 from coupled.arguments import public
-from coupled.authority.stability.whole import Stability, map_stability
+from coupled.authority.stability.whole import Stability, bending, map_stability
 from coupled.authority.whole import AuthorityMap, map_rig
 from coupled.errors import InputError
 from coupled.record.channels import ControlName
@@ -57,4 +57,5 @@ def stability(
     >>> found.limits[0].control, found.to_polars().columns[:2]
     ('column', ['control', 'quantity'])
     """
-    return map_stability(rig_given(rig), control, progress)
+    data = rig_given(rig)
+    return map_stability(data, bending(data, control), progress)

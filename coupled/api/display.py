@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -35,7 +35,7 @@ from coupled.plots.ladder import draw_ladder
 from coupled.plots.readings import draw_readings
 from coupled.plots.results import draw_result
 from coupled.plots.rigs import draw_rig
-from coupled.plots.saving import make_drawable
+from coupled.plots.saving import make_drawable, with_note
 from coupled.plots.taken import draw_taken
 from coupled.plots.verdicts import draw_verdicts
 from coupled.record.record import Record
@@ -57,6 +57,7 @@ from coupled.reports.page import InputFile, Made, Report, render, render_part
 from coupled.reports.records import draw_flight, fit_report, flight_report, record_report
 from coupled.reports.rigs import export_report, rig_report, survey_report
 from coupled.reports.sweep import sweep_report
+from coupled.rig.guesses import guess_note
 from coupled.rig.rig import Rig
 from coupled.surveying.whole import Survey
 
@@ -119,6 +120,9 @@ def draw(result: Any) -> Figure:
     way = DISPLAYS[type(result)]
     assert way.draw is not None
     figure = way.draw(result)
+    note = _guesses(result)
+    if "Guesses, not measurements" not in " ".join(figure.get_suptitle().split()):
+        with_note(figure, note)
     make_drawable(figure)
     return figure
 
@@ -127,7 +131,7 @@ def html(result: Any) -> str:
     """Return a result as a part of a page of HTML, which stands alone."""
     way = DISPLAYS[type(result)]
     report = way.brief or way.report
-    return render_part(report(result, _made(result)), way.sections)
+    return render_part(_noted(report(result, _made(result)), result), way.sections)
 
 
 def write_report(result: Any, file: str | PathLike[str]) -> None:
@@ -136,7 +140,21 @@ def write_report(result: Any, file: str | PathLike[str]) -> None:
     if path.suffix.lower() not in (".html", ".htm"):
         raise InputError(path, "", "a report is one HTML file: its name ends in .html")
     check_target(path)
-    write_text(path, render(DISPLAYS[type(result)].report(result, _made(result))))
+    write_text(path, render(_noted(DISPLAYS[type(result)].report(result, _made(result)), result)))
+
+
+def _guesses(result: Any) -> str:
+    """Return which numbers of a result's rig are guesses, a sentence or nothing."""
+    rig = DISPLAYS[type(result)].rig(result)
+    return "" if rig is None else guess_note(rig.controls)
+
+
+def _noted(report: Report, result: Any) -> Report:
+    """Return a report whose verdict names the guesses of the rig, unless it does so already."""
+    note, said = _guesses(result), report.verdict.remarks
+    if not note or any("Guesses, not measurements" in remark for remark in said):
+        return report
+    return replace(report, verdict=replace(report.verdict, remarks=(*said, note)))
 
 
 def _made(result: Any) -> Made:

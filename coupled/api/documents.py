@@ -34,7 +34,7 @@ def document(
     """Document a rig's forces, and hold them against the control checks of 14 CFR Part 60.
 
     Of one control, or of all. `readings` are a file of them, of the first control (a virtual
-    bench's unless given); `specified` is a rig that says what is specified, `aircraft` a CSV of the
+    bench's unless given); `specified` is a rig with the specification, `aircraft` a CSV of the
     aircraft's own forces. `date` and `revision` are printed as given. The pages, PNG and PDF, are
     written into `folder` where one is given. Raises InputError for a file that cannot be used.
 

@@ -47,6 +47,7 @@ Progress = Callable[[str, int, int], None]
 
 __all__ = ["AS_THE_RIG", "Comparison", "Flight", "Outcome", "compare", "fly_and_judge", "judge"]
 
+_STILL = 1e-4  # rad/s of a rate, below which an aircraft does not turn
 AS_THE_RIG = "as the rig file says"  # configuration name of an unchanged rig
 
 
@@ -210,4 +211,6 @@ def _motion_figures(
     there = side * (attitude - attitude[0]) >= manoeuvre.measure.attitude_change
     there &= record.time_s >= start
     reached = float(record.time_s[np.argmax(there)]) - start if there.any() else None
-    return float(rate.max()), float(far), reached
+    # The aircraft of a flight that ended early may never have turned to the pilot's side.
+    peak = None if record.ended_early is not None and rate.max() < _STILL else float(rate.max())
+    return peak, float(far), reached

@@ -82,6 +82,13 @@ def rows(flights: Sequence[Flight], system: System = "si") -> Iterator[tuple[str
                 ),
                 written,
             )
+    if any(flight.ended_early for flight in flights):
+        yield "flight ended early, s", [_end(flight) for flight in flights]
+
+
+def _end(flight: Flight) -> str:
+    """Return when a flight ended early, in s; a dash if it did not."""
+    return f"{flight.record.time_s[-1]:.1f}" if flight.ended_early else NONE
 
 
 def _travel(manoeuvre: Manoeuvre, system: System) -> tuple[float, str]:
@@ -122,11 +129,11 @@ def remarks(flights: Sequence[Flight], system: System = "si") -> list[str]:
     cases = [list(group) for _, group in groupby(flights, key=lambda f: f.outcome.case)]
     held = next(filter(None, (further(case, system) for case in cases)), "")
     said = [_without_correction(flights), *_resting(cases, system), *_saturated(cases), held]
-    said.append(_guessed(flights))
+    said.append(guessed(flights))
     return list(filter(None, said))
 
 
-def _guessed(flights: Sequence[Flight]) -> str:
+def guessed(flights: Sequence[Flight]) -> str:
     """Return which numbers of the control that is looked at are guesses, and what rests on them."""
     manoeuvre = flights[0].manoeuvre
     given = manoeuvre.source.changes if manoeuvre.source is not None else {}

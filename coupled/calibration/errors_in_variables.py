@@ -77,7 +77,10 @@ def errors_in_variables(readings: Readings, instruments: Instruments) -> JointFi
         design, whitened = _whitened(figures, readings, instruments)
         step = solve(design.reshape(-1, len(figures)), whitened.ravel())
         figures = figures + step
-        if np.all(np.abs(step) <= _settled(figures, columns)):
+        least = _settled(figures, columns)
+        if not readings.gauge:
+            least[2] = np.inf  # no reading determines S₃, and its steps are rounding
+        if np.all(np.abs(step) <= least):
             break
     else:
         raise FloatingPointError

@@ -95,7 +95,7 @@ def remarks(found: CalibrationResult, system: System = "si") -> list[str]:
         elif line.excess < SMALL:
             lines.append("They are smaller: the instruments are better than stated.")
     if line.bend.error > 0.0:
-        off = (plain.bend.value - line.bend.value) / line.bend.error
+        off = round((plain.bend.value - line.bend.value) / line.bend.error, 2) + 0.0  # no -0.00
         lines.append(
             f"Ordinary least squares takes ruler and scale as exact, which biases it: its K is"
             f" {off:+.2f} standard errors off. Use the fit with errors in all variables;"

@@ -22,7 +22,7 @@ from coupled.calibration.plan import stations
 from coupled.calibration.qualification import Issue
 from coupled.calibration.readingsfile import read_readings
 from coupled.calibration.result import CalibrationResult
-from coupled.errors import InputError, nearest
+from coupled.errors import InputError, nearest, shown
 from coupled.files import sha256
 from coupled.record.channels import ControlName
 from coupled.results import TableResult, frame_of
@@ -98,19 +98,23 @@ def document_rig(
         found.append(document(rig, name, travels.get(name), progress, specified, known))
     reference = "what the rig's own file specifies"
     if specified is not None:
-        reference = f"what {specified.name} specifies"
+        source = specified.file
+        reference = f"what {shown(source.name) if source else specified.name} specifies"
     if aircraft is not None:
-        reference += f"; static checks of the first control: {aircraft.name}, the aircraft's"
+        reference += f"; static checks of the first control: {shown(aircraft.name)}, the aircraft's"
     return ForceDocument(rig, tuple(found), fits, _issue(rig, reference, date, revision))
 
 
 def _issue(rig: Rig, reference: str, date: str, revision: str) -> Issue:
     """Return what the cover says: of the rig as it is, which may differ from its file."""
-    text = rig.to_toml()
+    text, file = rig.to_toml(), rig.file
     digest = hashlib.sha256(text.encode()).hexdigest()
-    name = rig.file.name if rig.file is not None else f"{rig.name}.toml"
-    if rig.file is not None and rig.file.is_file() and sha256(rig.file) != digest:
-        name += ", changed"
+    name = shown(file.name) if file is not None else f"{rig.name}.toml"
+    if file is not None and file.is_file():
+        if file.read_text(encoding="utf-8-sig") == text:  # whatever its line ends
+            digest = sha256(file)
+        else:
+            name += ", changed"
     return Issue(name, digest, reference, date, revision)
 
 
@@ -126,7 +130,7 @@ def _fit(
         if control != chosen[0]:
             return None
         read = read_readings(readings, control)
-        return calibrate_control(read, data, control, tools, readings), readings.name
+        return calibrate_control(read, data, control, tools, readings), shown(readings.name)
     try:
         grid = stations(rig, control, 5, 5)
     except InputError:

@@ -19,6 +19,7 @@ from coupled.calibration.plan import (
     precision,
     stations,
 )
+from coupled.display import System
 from coupled.record.channels import ControlName
 from coupled.results import Displayed, Tabular, frame_of
 from coupled.rig.rig import Rig
@@ -52,9 +53,9 @@ class ReadingsPlan(Displayed, Tabular):
         count, half = self.reached.readings, self.reached.half_width
         return f"ReadingsPlan({self.control}: {count} readings give K to ±{100 * half:.1f} %)"
 
-    def form(self) -> str:
-        """Return the form to fill in, a CSV."""
-        return form(self.chosen, self.control, self.looks, self.held)
+    def form(self, system: System = "si") -> str:
+        """Return the form to fill in, a CSV, in the units of a system."""
+        return form(self.chosen, self.control, self.looks, self.held, system)
 
     def as_dict(self) -> dict[str, Any]:
         """Return the plan as JSON takes it."""
@@ -95,6 +96,8 @@ def plan_readings(
             progress(f"{few} gradients by {many} deflections", done, len(_SIZES))
         grid = stations(rig, control, few, many, strongest_N)
         grids[few, many] = precision(rig, control, grid, instruments, looks)
+    if progress is not None:
+        progress("the fewest readings that reach it", len(_SIZES), len(_SIZES))
     chosen = fewest(rig, control, instruments, share, strongest_N, looks)
     design = [station for station, count in chosen for _ in range(count)]
     held = crossed_forces(rig, control, len(design), crossed_N)

@@ -23,6 +23,7 @@ from coupled.campaign.tolerances import (
     TIME_SHARE,
     SURFACE_rad,
 )
+from coupled.display import System, in_system, pressure_in
 from coupled.record.channels import CONTROL_NAMES, ControlName, unit_of
 from coupled.rig.equations import specified_gradient
 from coupled.rig.guesses import guess_note
@@ -74,6 +75,14 @@ def written(number: float) -> str:
     return f"{number:.0f}" if abs(number) >= 100.0 else f"{number:.3g}"
 
 
+def check_numbers(check: ControlCheck, system: System = "si") -> tuple[str, str, str, str]:
+    """Return what a check measured, its reference, its tolerance, and their unit, as text."""
+    unit = in_system(check.unit, system)
+    values = (check.measured, check.reference, check.tolerance)
+    measured, reference, allowed = (written(unit.factor * value) for value in values)
+    return measured, reference, allowed, unit.unit
+
+
 def cover_rows(documents: Sequence[Documentation], issue: Issue, version: str) -> Rows:
     """Return the content of a document's cover, in rows of name and value."""
     rig = documents[0].rig
@@ -93,7 +102,7 @@ def cover_rows(documents: Sequence[Documentation], issue: Issue, version: str) -
     )
 
 
-def feel_tests(found: Documentation, reference: str) -> Iterator[FeelTest]:
+def feel_tests(found: Documentation, reference: str, system: System = "si") -> Iterator[FeelTest]:
     """Yield a control's tests, the static ones first, a case for each dynamic pressure.
 
     `reference` names the reference of the results.
@@ -112,7 +121,7 @@ def feel_tests(found: Documentation, reference: str) -> Iterator[FeelTest]:
                 kind=kind,
                 control=found.control,
                 condition=condition,
-                conditions=(*_conditions(found, condition), *_method(kind, reference)),
+                conditions=(*_conditions(found, condition, system), *_method(kind, reference)),
                 tolerances=tuple(_tolerances(found, kind)),
                 checks=checks,
             )
@@ -127,18 +136,21 @@ def _entry(control: ControlName, kind: Kind) -> str:
     return f"2.{'a' if kind == 'static' else 'b'}.{CONTROL_NAMES.index(control) + 1}"
 
 
-def _conditions(found: Documentation, condition: FeelCondition) -> Iterator[tuple[str, str]]:
+def _conditions(
+    found: Documentation, condition: FeelCondition, system: System
+) -> Iterator[tuple[str, str]]:
     """Yield the conditions of a test."""
     rig, data, d = found.rig, found.rig.controls[found.control], unit_of(found.control)
     pressure = condition.pressure_Pa
     airspeed = math.sqrt(2.0 * pressure / _SEA_LEVEL_kg_per_m3)
     yield (
         "feel pressure q̄",
-        f"{pressure / 1000.0:.3f} kPa, {airspeed:.1f} m/s ({airspeed / KNOT_m_per_s:.0f} kt)"
+        f"{pressure_in(pressure, system, 3)}, {airspeed:.1f} m/s ({airspeed / KNOT_m_per_s:.0f} kt)"
         " equivalent airspeed, held",
     )
     gradient = float(specified_gradient(data.schedule, pressure))
-    yield "specified gradient G_T there", f"{gradient:.4g} N/{d}"
+    unit = in_system(f"N/{d}", system)
+    yield "specified gradient G_T there", f"{unit.written(gradient)} {unit.unit}"
     on = {True: "on", False: "off"}
     host = data.compensation
     yield (

@@ -61,6 +61,23 @@ UnitsOption = Annotated[
     ),
 ]
 
+PanelsOption = Annotated[
+    str,
+    typer.Option(
+        "--panels",
+        metavar="NAMES",
+        help="Panels of the figure, as surface,force: surface, motion, force, loss; of a sweep,"
+        " the figures that it keeps. (default: all)",
+    ),
+]
+OverlayOption = Annotated[
+    bool, typer.Option("--overlay", help="Cases, of a sweep configurations, in the same axes.")
+]
+SizeOption = Annotated[
+    str,
+    typer.Option("--size", metavar="WxH", help="Of the figure in print: 8.5x6cm, 85x60mm, 3x2in."),
+]
+
 WideOption = Annotated[
     bool,
     typer.Option("--wide", help="Tables with all columns, wider than the terminal if need be."),

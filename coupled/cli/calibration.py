@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -20,6 +19,7 @@ from coupled.cli.rigs import (
     StrongestOption,
     instruments,
     rig_and_control,
+    say_guesses,
 )
 from coupled.cli.terminal import check_json, keep_json, out, print_json, say, say_note
 from coupled.display import System, in_system
@@ -134,6 +134,7 @@ def _calibrate(
 
     (file, data, name), (write, figure, report, json_file) = rig, targets
     date, hardware = noted
+    note = say_guesses(data, (name,))
     with progress(f"fitting the {name}'s readings"):
         found = fit(read_readings(path, name), data.controls[name], name, tools, path)
     text = ""
@@ -149,7 +150,7 @@ def _calibrate(
             from coupled.plots.readings import draw_readings
             from coupled.plots.saving import save
 
-            save(draw_readings(found, shown(path.name), units), outputs.at(figure))
+            save(draw_readings(found, shown(path.name), units), outputs.at(figure), note)
         keep_json(found.as_dict(), json_file, outputs)
         if report is not None:
             from coupled.reports.calibration import calibration_report
@@ -157,7 +158,11 @@ def _calibrate(
             names = (data.name, shown(path.name), date)
             inputs = [path, file]
             write_report(
-                report, outputs, inputs, lambda made: calibration_report(found, *names, made, units)
+                report,
+                outputs,
+                inputs,
+                lambda made: calibration_report(found, *names, made, units),
+                note,
             )
     if json_file != "-":
         print_calibration(out, found, units)
@@ -179,9 +184,7 @@ def _plan(
     targets: tuple[Path | None, str],
     units: System,
 ) -> None:
-    from coupled.calibration.crossed import crossed_forces, crossed_precision
-    from coupled.calibration.form import form
-    from coupled.calibration.plan import deflection_needs, fewest, precision, stations
+    from coupled.calibration.planned import plan_readings
     from coupled.cli.tables.calibration import print_plan
 
     (file, rig, control), (write, json_file) = of_rig, targets
@@ -191,43 +194,19 @@ def _plan(
             raise InputError(write, "--write", "a form for readings ends in .csv")
         check_target(write, [file])
     check_json(json_file, [file, *([write] if write else [])])
-    sizes = [(few, many) for few in range(2, 7) for many in range(2, 7)]
-    grids = {}
     with progress() as advance:
-        for done, (few, many) in enumerate(sizes):
-            advance(f"{few} gradients by {many} deflections", done, len(sizes))
-            grid = stations(rig, control, few, many, strongest)
-            grids[few, many] = precision(rig, control, grid, tools, looks)
-        advance("the fewest readings that reach it", 0, 0)
-        chosen = fewest(rig, control, tools, share, strongest, looks)
-        design = [s for s, count in chosen for _ in range(count)]
-        reached = precision(rig, control, design, tools, looks)
-        needs = deflection_needs(rig, control, design, tools, looks)
-        held = crossed_forces(rig, control, len(design), crossed)
-        terms = crossed_precision(rig, control, design, crossed, tools, looks) if held else {}
-    table: dict[str, object] = {
-        "half_width": reached.half_width,
-        "bend": reached.bend,
-        "deflection": asdict(needs),
-        "readings": [{**s.__dict__, "count": count} for s, count in chosen],
-        "grids": [
-            {"gradients": few, "deflections": many, "half_width": grid.half_width}
-            for (few, many), grid in grids.items()
-        ],
-    }
-    if held:
-        table["bend_by_others_half_width"] = terms
+        found = plan_readings(rig, control, tools, share, strongest, looks, crossed, advance)
     with Outputs() as outputs:
         if write is not None:
-            write_text(outputs.at(write), form(chosen, control, looks, held, units))
-        keep_json(table, json_file, outputs)
+            write_text(outputs.at(write), found.form(units))
+        keep_json(found.as_dict(), json_file, outputs)
     if json_file != "-":
-        print_plan(out, control, grids, chosen, reached, needs, units)
-        for name, half in terms.items():
+        print_plan(out, found, units)
+        for name, half in found.others.items():
             force, bend = (in_system(u, units) for u in ("N", f"{unit_of(control)}/N"))
             held_at = f"±{force.factor * crossed:.4g} {force.unit}"
             reached_to = f"±{bend.written(half, 2)} {bend.unit}"
             say(f"with {held_at} on the {name}: K by {name} to {reached_to}")
         if write is not None:
             say(f"form: {write}")
-    print_json(table, json_file)
+    print_json(found.as_dict(), json_file)

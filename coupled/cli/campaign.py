@@ -7,7 +7,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from coupled.cli.app import JsonOption, UnitsOption, app, check_cluster
+from coupled.cli.app import (
+    JsonOption,
+    OverlayOption,
+    PanelsOption,
+    SizeOption,
+    UnitsOption,
+    app,
+    check_cluster,
+)
 from coupled.cli.process import asked_to_stop
 from coupled.cli.progress import progress
 from coupled.cli.reporting import ReportOption, check_report, say_report, write_report
@@ -21,6 +29,7 @@ from coupled.resources import find, shipped_sweeps
 if TYPE_CHECKING:
     from coupled.campaign.sweep import SweepResult
     from coupled.display import System
+    from coupled.plots.layout import Layout
 
 
 @app.command(
@@ -65,7 +74,7 @@ def check(
             from coupled.reports.check import check_report as reported
 
             note = " ".join(dict.fromkeys(filter(None, notes)))
-            write_report(report, outputs, inputs, lambda made: reported(checked, made), note)
+            write_report(report, outputs, inputs, lambda made: reported(checked, made, units), note)
     if json_file != "-":
         print_verdicts(out, checked.verdicts, units)
         if junit is not None:
@@ -101,6 +110,9 @@ def sweep(
     json_file: JsonOption = "",
     report: ReportOption = None,
     units: UnitsOption = "si",
+    panels: PanelsOption = "",
+    overlay: OverlayOption = False,
+    size: SizeOption = "",
 ) -> None:
     """Fly a run over values of its parameters, to one table; called again, it goes on."""
     from coupled.campaign.journal import JOURNAL
@@ -108,11 +120,15 @@ def sweep(
     from coupled.campaign.sensitivity import INDICES
     from coupled.campaign.sweep import TABLE
     from coupled.campaign.sweep import sweep as fly_all
+    from coupled.plots.layout import layout_of
+    from coupled.plots.results import check_layout
     from coupled.plots.saving import check_format
 
     file = find(name, shipped_sweeps(), "sweep")
     check_cluster(workers, cluster)
     plan = read_plan(file)
+    layout = layout_of(panels, overlay, size)
+    check_layout(plan.sweep, layout)
     target = folder or Path("out") / plan.sweep.name
     if target.is_file():
         raise InputError(target, "", "is a file; give a folder")
@@ -134,7 +150,7 @@ def sweep(
     except KeyboardInterrupt:
         err.print("[yellow]interrupted:[/] finished flights are kept; the same command goes on")
         raise typer.Exit(130) from None
-    _show(found, target, path, json_file, (report, units))
+    _show(found, target, (path, layout), json_file, (report, units))
 
 
 def _say_found(found: int, flights: int) -> None:
@@ -149,15 +165,15 @@ def _say_found(found: int, flights: int) -> None:
 def _show(
     found: SweepResult,
     target: Path,
-    path: Path,
+    figure: tuple[Path, Layout],
     json_file: str,
     handed: tuple[Path | None, System],
 ) -> None:
     """Draw and print a sweep's table, with its indices or boundaries where they are asked for.
 
-    `handed` is the report's file, if any, and the units of the tables.
+    `figure` is the figure's file and layout, `handed` the report's file, if any, and the units.
     """
-    report, units = handed
+    (path, layout), (report, units) = figure, handed
     from coupled.campaign.sensitivity import INDICES, write_indices
     from coupled.campaign.sweep import TABLE
     from coupled.cli.tables.campaign import print_indices, print_survival, print_sweep
@@ -169,7 +185,7 @@ def _show(
     with Outputs() as outputs:
         if found.indices:
             write_indices(found.indices, outputs.at(target / INDICES))
-        save(draw_result(found, units), outputs.at(path))
+        save(draw_result(found, units, layout), outputs.at(path))
         keep_json(rows, json_file, outputs)
         if report is not None:
             from coupled.reports.sweep import sweep_report

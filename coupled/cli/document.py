@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,19 +13,16 @@ import typer
 from coupled.cli.app import JsonOption, UnitsOption, app
 from coupled.cli.progress import progress
 from coupled.cli.reporting import ReportOption, check_report, say_report, write_report
-from coupled.cli.rigs import DEFAULT_RIG, instruments, rig_and_control, say_doubts
+from coupled.cli.rigs import DEFAULT_RIG, rig_and_control, say_doubts
 from coupled.cli.terminal import check_json, keep_json, out, print_json, say
 from coupled.errors import InputError, shown
-from coupled.files import check_target, sha256, write_text
+from coupled.files import check_target, write_text
 from coupled.outputs import Outputs
 from coupled.record.channels import ControlName
 from coupled.resources import find, shipped_rigs
 
 if TYPE_CHECKING:
-    from coupled.calibration.aircraftdata import AircraftData
     from coupled.calibration.documentation import Documentation
-    from coupled.calibration.qualification import Issue
-    from coupled.calibration.result import CalibrationResult
     from coupled.display import System
     from coupled.rig.rig import Rig
 
@@ -71,8 +69,9 @@ def document(
 
     A check that fails gives exit code 1, and the table says why.
     """
-    from coupled.calibration.documentation import controls_of, surface_travels
-    from coupled.calibration.documentation import document as gather
+    from coupled.calibration.documentation import controls_of
+    from coupled.calibration.forcedocument import document_rig
+    from coupled.plots.documentation import draw_pages
     from coupled.rig.rigfile import read_rig
 
     file = find(rig, shipped_rigs(), "rig")
@@ -92,20 +91,20 @@ def document(
     text = ""
     if write is not None:
         data, text = _remedied(data, chosen, file, write, [*inputs, pdf])
-    fits = {name: _fit_for(readings, data, name, chosen) for name in chosen}
-    travels = surface_travels(data, file)
-    read = _aircraft_data(aircraft, wanted or data, chosen[0], travels)
-    documents = []
+    only = chosen[0] if control else None
     with progress() as advance:
-        for name in chosen:
-            known = read if name == chosen[0] else None
-            documents.append(gather(data, name, travels.get(name), advance, wanted, known))
-    from coupled.plots.documentation import draw_pages
-
-    issue = _issue(file, text, reference, aircraft, (date, revision))
-    table = {found.control: [check.as_dict() for check in found.checks] for found in documents}
+        found = document_rig(
+            data, only, readings, wanted, aircraft, date, revision, progress=advance
+        )
+    if write is not None:
+        name = f"{shown(file.name)}, with mass, damping and a lead that go with the gradient"
+        digest = hashlib.sha256(text.encode()).hexdigest()
+        found = replace(found, issue=replace(found.issue, rig_file=name, rig_sha256=digest))
+    table = found.as_dict()
     with progress("drawing the pages"), Outputs() as outputs:
-        written = draw_pages(documents, fits, issue, outputs.folder(folder), outputs.at(pdf))
+        written = draw_pages(
+            found.controls, found.fits, found.issue, outputs.folder(folder), outputs.at(pdf), units
+        )
         if write is not None:
             write_text(outputs.at(write), text)
         keep_json(table, json_file, outputs)
@@ -113,16 +112,19 @@ def document(
             from coupled.reports.forces import force_report
 
             write_report(
-                report, outputs, inputs, lambda made: force_report(documents, fits, issue, made)
+                report,
+                outputs,
+                inputs,
+                lambda made: force_report(found.controls, found.fits, found.issue, made, units),
             )
     if json_file != "-":
-        _print(documents, every, bool(travels), units)
+        _print(found.controls, every, data.flight is not None, units)
         say(f"{len(written)} figures and {pdf.name} in {folder}")
         if write is not None:
             say(f"rig: {write}")
         say_report(report)
     print_json(table, json_file)
-    if not all(check.passed for found in documents for check in found.checks):
+    if not found.passed:
         raise typer.Exit(1)
 
 
@@ -136,28 +138,6 @@ def _print(documents: Sequence[Documentation], every: bool, judged: bool, units:
         print_checks(out, found.control, found.checks, every, why, units)
     if not judged:
         out.print("no aircraft: the surface's position is not judged\n")
-
-
-def _issue(
-    rig_file: Path,
-    written: str,
-    specified: Path | None,
-    aircraft: Path | None,
-    given: tuple[str, str],
-) -> Issue:
-    """Return what the cover says; `written` is the text of a rig that is made here, if any."""
-    from coupled.calibration.qualification import Issue
-
-    reference = "what the rig's own file specifies"
-    if specified is not None:
-        reference = f"what {shown(specified.name)} specifies"
-    if aircraft is not None:
-        reference += f"; static checks of the first control: {shown(aircraft.name)}, the aircraft's"
-    name, digest = shown(rig_file.name), sha256(rig_file)
-    if written:
-        name += ", with mass, damping and a lead that go with the gradient"
-        digest = hashlib.sha256(written.encode()).hexdigest()
-    return Issue(name, digest, reference, *given)
 
 
 def _remedied(
@@ -183,43 +163,3 @@ def _remedied(
     text = rig_text(rig, remark)
     rig_from_table(loads_toml(text, target), target)  # a rig that cannot be flown is refused
     return rig, text
-
-
-def _aircraft_data(
-    path: Path | None, specified: Rig, control: ControlName, travels: Mapping[str, float]
-) -> AircraftData | None:
-    """Return what was read on the aircraft, of the first control chosen."""
-    if path is None:
-        return None
-    from coupled.calibration.aircraftdata import read_aircraft_data
-
-    if control not in specified.controls:
-        raise InputError(specified.name, "controls", f"the rig has no {control}")
-    return read_aircraft_data(path, control, specified.controls[control], travels.get(control))
-
-
-def _fit_for(
-    readings: Path | None, rig: Rig, control: ControlName, chosen: list[ControlName]
-) -> tuple[CalibrationResult, str] | None:
-    """Return the fit to draw of a control, and where its readings are from; none for one gradient.
-
-    A user's readings are those of the first control chosen.
-    """
-    from coupled.calibration.bench import CalibrationBench, take_readings
-    from coupled.calibration.calibrate import calibrate_control as fit
-    from coupled.calibration.plan import stations
-    from coupled.calibration.readingsfile import read_readings
-
-    data, tools = rig.controls[control], instruments(control, None)
-    if readings is not None:
-        if control != chosen[0]:
-            return None
-        return fit(read_readings(readings, control), data, control, tools, readings), shown(
-            readings.name
-        )
-    try:
-        grid = stations(rig, control, 5, 5)
-    except InputError:
-        return None
-    made = take_readings(CalibrationBench(rig, control, grid, tools), 0)
-    return fit(made, data, control, tools, rig.name), "a virtual bench's readings"

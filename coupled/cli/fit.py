@@ -10,7 +10,7 @@ import typer
 from coupled.cli.app import JsonOption, WideOption, app
 from coupled.cli.held import RECORDS, check_rig_target, files_read, read_each
 from coupled.cli.progress import progress
-from coupled.cli.rigs import ControlOption
+from coupled.cli.rigs import ControlOption, say_guesses
 from coupled.cli.terminal import check_json, keep_json, out, print_json, say
 from coupled.errors import shown
 from coupled.files import write_text
@@ -60,6 +60,7 @@ def fit(
     records = read_each(logs)
     with progress() as advance:
         fitted = fit_nominal(start, records, free or (), name, advance)
+    say_guesses(fitted.rig, (name,))
     with Outputs() as outputs:
         if output is not None:
             text = _text(fitted, rig_file, logs)

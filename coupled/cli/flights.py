@@ -9,14 +9,22 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.table import Table
 
-from coupled.cli.app import JsonOption, RunArgument, UnitsOption, app
+from coupled.cli.app import (
+    JsonOption,
+    OverlayOption,
+    PanelsOption,
+    RunArgument,
+    SizeOption,
+    UnitsOption,
+    app,
+)
 from coupled.cli.process import INTERRUPTED
 from coupled.cli.progress import progress
 from coupled.cli.reporting import ReportOption, check_report, say_report, write_report
 from coupled.cli.rigs import say_doubts, say_stale
 from coupled.cli.tables.whole import print_whole
 from coupled.cli.terminal import check_json, err, give_json, keep_json, out, print_json, say
-from coupled.errors import InputError, shown
+from coupled.errors import InputError, nearest, shown
 from coupled.files import check_target
 from coupled.outputs import Outputs
 from coupled.resources import DEFAULT_RUN, shipped_rigs, shipped_runs, shipped_sweeps
@@ -24,11 +32,13 @@ from coupled.timing import timed
 
 if TYPE_CHECKING:
     from coupled.authority.compare import Flight
+    from coupled.flight.manoeuvre import Manoeuvre
 
 
 @app.command(
     epilog="[dim]Examples: coupled compare · coupled compare pull-up-737 --figure out/737.png"
-    " · coupled compare my-run.toml --json - · coupled compare --report out/report.html[/]"
+    " · coupled compare my-run.toml --json - · coupled compare --report out/report.html"
+    " · coupled compare --panels surface,force --size 8.5x6cm --figure out/paper.pdf[/]"
 )
 def compare(
     run: RunArgument = DEFAULT_RUN,
@@ -39,6 +49,10 @@ def compare(
     no_figure: Annotated[bool, typer.Option("--no-figure", help="Draw nothing.")] = False,
     report: ReportOption = None,
     units: UnitsOption = "si",
+    panels: PanelsOption = "",
+    overlay: OverlayOption = False,
+    size: SizeOption = "",
+    case: Annotated[str, typer.Option(help="Case to fly, by its label; else all.")] = "",
 ) -> None:
     """Fly a run rigid, uncompensated, with each correction, and with both."""
     from coupled.authority.compare import compare as compare_flights
@@ -47,13 +61,19 @@ def compare(
     from coupled.flight.runfile import read_run
 
     cases = read_run(run)
+    if case:
+        cases = [_labelled(case, cases, run)]
     path = figure or Path("out") / f"{cases[0].name}.png"
     inputs = [file for case in cases for file in input_files(case)]
     if not no_figure:
-        from coupled.plots.saving import check_format
+        from coupled.plots.flights import draw_comparison, panels_of
+        from coupled.plots.layout import layout_of
+        from coupled.plots.saving import check_format, save
 
         check_format(path)
         check_target(path, inputs)
+        layout = layout_of(panels, overlay, size)
+        layout.chosen(panels_of(cases[0]))
     own = inputs if no_figure else [*inputs, path]
     check_json(json_file, [*own, *check_report(report, own)])
     say_stale(cases[0].rig)
@@ -64,10 +84,7 @@ def compare(
     table = flights.as_dict()
     with timed("draw and write"), Outputs() as outputs:
         if not no_figure:
-            from coupled.plots.flights import draw_comparison
-            from coupled.plots.saving import save
-
-            save(draw_comparison(flights, units), outputs.at(path))
+            save(draw_comparison(flights, units, layout), outputs.at(path))
         keep_json(table, json_file, outputs)
         if report is not None:
             from coupled.reports.comparison import comparison_report
@@ -100,16 +117,13 @@ def fly(
 ) -> None:
     """Fly one run and write its record, and a manifest beside it."""
     from coupled.authority.compare import AS_THE_RIG, fly_and_judge
-    from coupled.errors import nearest
     from coupled.flight.manifest import input_files
     from coupled.flight.manoeuvre import EVERY_CONFIGURATION
     from coupled.flight.runfile import read_run
     from coupled.record.record import check_suffix, manifest_path, write_record
 
-    cases = {each.label: each for each in read_run(run)}
-    if case and case not in cases:
-        raise InputError(run, "--case", f"no case {case!r}; {nearest(case, cases)}")
-    manoeuvre = cases[case] if case else next(iter(cases.values()))
+    cases = read_run(run)
+    manoeuvre = _labelled(case, cases, run) if case else cases[0]
     for known in EVERY_CONFIGURATION:
         if configuration == known:
             manoeuvre = manoeuvre.configured(known)
@@ -142,6 +156,14 @@ def fly(
     if flight.ended_early:
         err.print(f"[yellow]ended early:[/] {flight.ended_early}; the record so far is kept")
     _end([flight])
+
+
+def _labelled(label: str, cases: Sequence[Manoeuvre], run: str) -> Manoeuvre:
+    """Return the case of a run with a label. Raises InputError where it has none."""
+    by_label = {each.label: each for each in cases}
+    if label not in by_label:
+        raise InputError(run, "--case", f"no case {label!r}; {nearest(label, by_label)}")
+    return by_label[label]
 
 
 @app.command(epilog="[dim]Example: coupled plot out/t37.csv --figure out/t37.pdf[/]")

@@ -115,9 +115,9 @@ def diagnose(
         if improve is not None and not worse:
             _write_improved(outputs.at(improve), whole, rig_file, read)
         if plots is not None:
-            _draw(outputs.folder(plots), whole, note)
+            _draw(outputs.folder(plots), whole, note, units)
         keep_json(table, json_file, outputs)
-        _report(report, outputs, inputs, (whole, power, note))
+        _report(report, outputs, inputs, (whole, power, note, units))
     if json_file != "-":
         if rig_file is None:
             say(f"rig: {whole.nominal.name}, of the manifest of {shown(records[0].name)}")
@@ -237,25 +237,32 @@ def _plot_targets(folder: Path | None) -> list[Path]:
 
 
 def _report(
-    path: Path | None, outputs: Outputs, inputs: list[Path], handed: tuple[Diagnosis, bool, str]
+    path: Path | None,
+    outputs: Outputs,
+    inputs: list[Path],
+    handed: tuple[Diagnosis, bool, str, System],
 ) -> None:
-    """Write a diagnosis's report; `handed` is it, whether with its power, and a note."""
-    whole, power, note = handed
+    """Write a diagnosis's report; `handed` is it, with power or without, a note, and units."""
+    whole, power, note, units = handed
     if path is None:
         return
     from coupled.reports.diagnosis import diagnosis_report
 
     title = ", ".join(shown(Path(name).name) for name in whole.records)
     write_report(
-        path, outputs, inputs, lambda made: diagnosis_report(whole, title, made, power), note
+        path,
+        outputs,
+        inputs,
+        lambda made: diagnosis_report(whole, title, made, power, units),
+        note,
     )
 
 
-def _draw(folder: Path, whole: Diagnosis, note: str) -> None:
+def _draw(folder: Path, whole: Diagnosis, note: str, units: System) -> None:
     from coupled.plots.gaps import draw_diagnosis
     from coupled.plots.saving import save
 
-    for file, figure in draw_diagnosis(whole).items():
+    for file, figure in draw_diagnosis(whole, units).items():
         save(figure, folder / file, note)
 
 

@@ -35,10 +35,11 @@ def draw_map(
     units: UnitsOption = "si",
 ) -> None:
     """Map what a rig loses over q̄ and deflection, and its stick force per g and per knot."""
-    from coupled.authority.maps import envelope, feel, loss_maps, shipped_flights
-    from coupled.cli.tables.maps import write_feel, write_losses
+    from coupled.authority.whole import map_rig
+    from coupled.cli.tables.maps import write_feel
     from coupled.plots.maps import draw_feel, draw_losses
     from coupled.plots.saving import check_format, save
+    from coupled.record.csvfile import write_table
     from coupled.record.record import check_suffix, read_record
     from coupled.rig.rigfile import read_rig
 
@@ -57,18 +58,12 @@ def draw_map(
             raise InputError(given, "dynamic_pressure_Pa", "no such column")
     note = say_doubts(data)
     with progress() as advance:
-        if not record:
-            records = shipped_flights(data, advance)
-        felt = feel(data, file, advance)
-        maps = {}
-        for done, name in enumerate(data.controls):
-            advance(f"{name}: losses over q̄ and deflection", done, len(data.controls))
-            maps[name] = loss_maps(data, name)
-    flown = {name: envelope(records, name) for name in data.controls}
+        found = map_rig(data, records if record else None, advance)
+    felt = found.feel
     with progress("drawing the maps"), Outputs() as outputs:
-        save(draw_losses(data.name, maps, flown, units), outputs.at(written[0]), note)
-        losses = (loss_map for of_control in maps.values() for loss_map in of_control)
-        write_losses(losses, outputs.at(written[1]))
+        drawn = draw_losses(data.name, found.losses, found.flown, units)
+        save(drawn, outputs.at(written[0]), note)
+        write_table(found.to_polars(), outputs.at(written[1]))
         if felt is not None:
             save(draw_feel(data.name, felt, units), outputs.at(written[2]), note)
             write_feel(felt, outputs.at(written[3]))

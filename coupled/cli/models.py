@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -41,31 +42,19 @@ def models(
     json_file: JsonOption = "",
 ) -> None:
     """List JSBSim's models: where each trims or why not, how its controls move, its rigs."""
-    from coupled.parallel import as_done, cores, executor
-    from coupled.surveying.survey import known_models, survey
+    from coupled.surveying.survey import chosen_models
+    from coupled.surveying.whole import survey_models
 
-    known = known_models()
-    for name in names or ():
-        if name not in known:
-            problem = f"there is no JSBSim model {name!r}; {nearest(name, known)}"
-            raise InputError("coupled models", "", problem)
+    chosen_models(names or (), "coupled models")
     check_json(json_file, [])
-    chosen = list(names or known)
-    found: dict[str, Surveyed] = {}
-    # A survey keeps a core busy, and each process holds a model: more than the cores only cost.
-    count = 1 if len(chosen) < 4 else min(cores(workers), cores(0), len(chosen))
-    with progress() as advance, executor(count) as pool:
-        calls = [(name, known[name]) for name in chosen]
-        for one in as_done(pool, survey, calls, 2 * count):
-            found[one.model] = one
-            advance(one.model, len(found), len(chosen))
-    rows = [found[name] for name in chosen]
+    with progress() as advance:
+        found = survey_models(names or (), workers, advance)
     if json_file != "-":
-        _print(rows)
-    give_json([row.as_dict() for row in rows], json_file)
+        _print(found.models)
+    give_json(found.as_dict(), json_file)
 
 
-def _print(rows: list[Surveyed]) -> None:
+def _print(rows: Sequence[Surveyed]) -> None:
     table = Table("model", "trims at", "controls", "rigs", box=None, pad_edge=False)
     for row in rows:
         where, controls = f"[yellow]no:[/] {escape(row.why)}", ""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from coupled.errors import InputError
@@ -13,7 +11,7 @@ from coupled.flight.altered import ALTERATIONS
 from coupled.flight.event import OFF, PICK, Event
 from coupled.flight.loop import make_airframe
 from coupled.flight.manoeuvre import Manoeuvre
-from coupled.flight.weather import Gust, Turbulence, Wind
+from coupled.flight.weather import GUST, Gust, Turbulence, Wind, gust_properties
 from coupled.record.channels import SURFACES
 from coupled.resources import aircraft_folder
 from coupled.rig.packing import COMMAND_SIGN
@@ -22,7 +20,7 @@ from coupled.units import FOOT_m
 
 _TRIMS = {"column": "pitch", "wheel": "roll", "pedals": "yaw"}
 _MOVED = np.linspace(-1.0, 1.0, 201)  # positions of a moved trim
-_GUST, _MILSPEC = "atmosphere/cosine-gust/", "atmosphere/turbulence/milspec/"
+_MILSPEC = "atmosphere/turbulence/milspec/"
 
 
 def add_conditions(script: Script, manoeuvre: Manoeuvre) -> None:
@@ -64,17 +62,8 @@ def _add_wind(script: Script, wind: Wind) -> None:
 
 
 def _add_gust(script: Script, gust: Gust) -> None:
-    velocity = (gust.along / FOOT_m, gust.across / FOOT_m, -gust.up / FOOT_m)
-    values = {
-        "startup-duration-sec": gust.rise,
-        "steady-duration-sec": gust.hold,
-        "end-duration-sec": gust.rise if gust.fall is None else gust.fall,
-        "magnitude-ft_sec": math.hypot(*velocity),
-        "frame": 3.0,
-        **{f"{way}-velocity-ft_sec": v for way, v in zip("XYZ", velocity, strict=True)},
-    }
-    script.started |= {_GUST + name: value for name, value in values.items()}
-    script.at.append((gust.at, {_GUST + "start": 1.0}))
+    script.started |= gust_properties(gust)
+    script.at.append((gust.at, {GUST + "start": 1.0}))
 
 
 def _add_turbulence(script: Script, turbulence: Turbulence, seed: int) -> None:

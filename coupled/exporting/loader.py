@@ -4,7 +4,7 @@
 
 The smooth part is stepped by the implicit midpoint rule, like the rig's own. Friction and breakout
 are set-valued here too, and implicit: with u = δc' at the middle of the step h,
-A = 2m/h + c + h·k/2 and W = A·δc' + all forces,
+A = 2m/h + c + h·k/2 and W = A·δc' + the forces but for friction and breakout,
 
     A·u + F_c·Sgn(u) + F_BO·Sgn(δc + h·u) ∋ W
 

@@ -23,7 +23,7 @@ from coupled.schema import Section, quantity
 from coupled.units import FOOT_m
 
 _WINDS = ("atmosphere/wind-north-fps", "atmosphere/wind-down-fps")
-_GUST = "atmosphere/cosine-gust/"
+GUST = "atmosphere/cosine-gust/"
 _LOCAL = 3.0  # JSBSim's number of the frame north, east, down; the initial heading is north
 _STRONGEST = 100.0  # m/s
 _TURBULENCE = "atmosphere/turbulence/milspec/"
@@ -81,6 +81,20 @@ def check_gust(gust: Gust, file: object) -> None:
         raise InputError(file, "gust", problem)
 
 
+def gust_properties(gust: Gust) -> dict[str, float]:
+    """Return JSBSim's properties of a gust, in ft and s, without its start."""
+    velocity = (gust.along / FOOT_m, gust.across / FOOT_m, -gust.up / FOOT_m)
+    values = {
+        "startup-duration-sec": gust.rise,
+        "steady-duration-sec": gust.hold,
+        "end-duration-sec": gust.rise if gust.fall is None else gust.fall,
+        "magnitude-ft_sec": math.hypot(*velocity),
+        "frame": _LOCAL,
+        **{f"{way}-velocity-ft_sec": v for way, v in zip("XYZ", velocity, strict=True)},
+    }
+    return {GUST + name: value for name, value in values.items()}
+
+
 class MovingAir(Wrapper):
     """A run's wind: along the heading of the start, which is north, and upwards."""
 
@@ -112,18 +126,9 @@ class DiscreteGust(Wrapper):
     def attach(self, aircraft: Aircraft) -> Hook | None:
         """Set the gust in JSBSim, and return a hook that starts it in its frame."""
         gust, file = self._gust, self._file
-        velocity = (gust.along / FOOT_m, gust.across / FOOT_m, -gust.up / FOOT_m)
-        values = {
-            "startup-duration-sec": gust.rise,
-            "steady-duration-sec": gust.hold,
-            "end-duration-sec": gust.rise if gust.fall is None else gust.fall,
-            "magnitude-ft_sec": math.hypot(*velocity),
-            "frame": _LOCAL,
-            **{f"{way}-velocity-ft_sec": v for way, v in zip("XYZ", velocity, strict=True)},
-        }
-        for name, value in values.items():
-            aircraft.lever(_GUST + name, file, "gust").set(value)
-        start = aircraft.lever(_GUST + "start", file, "gust").set
+        for name, value in gust_properties(gust).items():
+            aircraft.lever(name, file, "gust").set(value)
+        start = aircraft.lever(GUST + "start", file, "gust").set
         frame, first = 0, math.ceil(gust.at / self._frame_s - 1e-6)
 
         def blow() -> None:

@@ -83,8 +83,8 @@ HEALTHY_SIGMAS = 3.0  # chosen: of an effect's scatter there, within which it is
 # Whether a machine changed (`changed`).
 CHANGE_CHANCE = 0.02  # of a false alarm by all features of a healthy record together
 CHANGE_SHOWN = 0.9  # probability with which the stated size of change is shown
-CHANGE_STILL = 0.1  # chosen: of the rms speed, under which there is no direction
-CHANGE_BIN = 0.02  # chosen: of a record's frames, fewer of which give no mean
+CHANGE_STILL = 0.1  # chosen: share of the RMS speed below which the direction is undefined
+CHANGE_BIN = 0.02  # chosen: least share of a record's frames for a mean
 
 # What drives a machine (`drives`).
 HELD_JUMPS = 20  # chosen: fewer changes do not show that a signal comes in set points
@@ -137,7 +137,7 @@ STIFFEST_AIR = 1e12  # frames⁴: a weight beyond which the banded equations los
 
 PLAYS = 40  # chosen: plays of a scan before an imposed motion's are fitted,
 PLAY_LEAST = 1e-5  # chosen: of the travel, from which on
-PLAYS_ALIKE = 0.1  # chosen: relative difference of two, below which one is enough
+PLAYS_ALIKE = 0.1  # chosen: relative difference below which two starts count as one
 JUMP_COUNTED = 0.2  # chosen: of a force's misfit within half a frame of a jump
 
 # Settings of the nominal rig (`case`).
@@ -151,9 +151,9 @@ CLOCK_s = 5e-4  # chosen: by which a recorder may stamp one channel late, or ear
 SETTLE_FROM = 1.05  # chosen: gap from which a stage's settings are worth fitting
 
 # The scale of a machine (`scales`).
-COLUMN_FORCE_N, COLUMN_WAY = 20.0, {"m": 0.03, "rad": 0.3}  # chosen: rms of a column's, a wheel's
-OTHER_SCALE = 5.0  # chosen: times as large or small, from which starts and bounds are another's
-BOUND_SCALES = 3.0  # chosen: rms forces, within which no bound on a force lies
+COLUMN_FORCE_N, COLUMN_WAY = 20.0, {"m": 0.03, "rad": 0.3}  # chosen: RMS of a column, a wheel
+OTHER_SCALE = 5.0  # chosen: factor of scale from which starts and bounds are rescaled
+BOUND_SCALES = 3.0  # chosen: least bound of a force, in RMS forces
 
 # Fitting (`fit`).
 DIFFERENCE = 0.3  # floors by which a difference moves the residual: less falls between its jumps
@@ -291,10 +291,13 @@ LEAST_HOLD = 2.0  # chosen: stretches that hold a half's action, under which its
 # The search over sets of effects (`beam`).
 BEAM_WIDTH, BEAM_DEPTH = 6, 4  # sets that are followed, and effects of a set
 GIVEN_UP = 30.0  # log evidence behind the best, from which a start or a set is given up
-BEGUN_BEHIND = 120.0  # chosen: the same of a fit that has only begun
+BEGUN_BEHIND = 120.0  # chosen: the same for a fit after its first steps
 BEAM_CANDIDATES, BEAM_BESIDE = 8, 4  # chosen: fitted beside the best set, and beside any other
 BEAM_FIRST = 4  # chosen: evaluations of each start, after which they are compared
-FIT_LEGS, WEIGHT_CHANGED = 3, 2.0  # chosen: legs of a fit, while its weights change by so much
+FIT_LEGS, WEIGHT_CHANGED = (
+    3,
+    2.0,
+)  # chosen: most legs of a fit, while weights change so
 BEAM_SIZES = (0.03, 0.3, 1.0, 5.0)  # chosen: times where a parameter starts, for signatures
 BEAM_FACTORS = (-2.0, 0.5, 1.0, 5.0)  # chosen: the same for how far a factor is from 1
 PRIOR_EFFECT = 4.0  # −ln of an effect's prior probability: one of some 56, about equally likely

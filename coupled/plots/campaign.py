@@ -12,10 +12,12 @@ from matplotlib.figure import Figure
 from coupled.campaign.entry import AS_FILED
 from coupled.display import System, parameter_label
 from coupled.plots.grids import draw_grid, is_grid
-from coupled.plots.sweepview import Shown, mark_ended, place_of, titled, varying
+from coupled.plots.layout import Layout, for_print
+from coupled.plots.sweepview import Shown, coincident, mark_ended, place_of, titled, varying
 
 _COLOURS = ("black", "#d55e00", "#0072b2", "#009e73", "#cc79a7", "#e69f00")
 _MOST_COLUMNS = 4
+_USUAL = Layout()
 
 
 def draw_sweep(
@@ -25,6 +27,7 @@ def draw_sweep(
     title: str = "",
     remarks: Sequence[str] = (),
     system: System = "si",
+    layout: Layout = _USUAL,
 ) -> Figure:
     """Draw up to four figures, a row each; those that do not vary are named in the title.
 
@@ -33,13 +36,18 @@ def draw_sweep(
     A grid over two parameters is drawn as lines or a map. Of any other, up to four parameters
     with numbers have a column each, and a colour stands for a configuration; with a single one,
     for the next parameter's value. The flights that ended early are crosses on the lower edge.
+
+    The layout may name some of the figures, and overlay the configurations of a grid's lines.
+    Raises InputError for a figure that is not there, and for maps overlaid.
     """
     numeric = [key for key in keys if found[key].dtype.is_numeric()][:_MOST_COLUMNS] or ["flight"]
-    figures, still = varying(found, figures, system)
+    figures, still = varying(found, layout.chosen(figures), system)
+    remarks = (*remarks, *coincident(found, keys, figures))
     remark = " ".join((f"{still}." if still and remarks else still, *remarks)).strip()
     if is_grid(found, keys, numeric):
-        return draw_grid(found, (numeric[0], numeric[1]), figures, (title, remark), system)
-    width, height = max(1.5 + 3.6 * len(numeric), 5.5), 1.1 + 2.3 * len(figures)
+        pair, heading = (numeric[0], numeric[1]), (title, remark)
+        return for_print(draw_grid(found, pair, figures, heading, system, layout), layout)
+    width, height = layout.size(max(1.5 + 3.6 * len(numeric), 5.5), 1.1 + 2.3 * len(figures))
     drawn = Figure(figsize=(width, height), layout="constrained")
     drawn.suptitle(titled(title, remark, width), fontsize=11)
     panels = drawn.subplots(len(figures), len(numeric), squeeze=False, sharex="col", sharey="row")
@@ -54,7 +62,7 @@ def draw_sweep(
     handles, labels = panels[0, 0].get_legend_handles_labels()
     if len(labels) > 1 or "ended early" in labels:
         drawn.legend(handles, labels, loc="outside lower center", ncols=3, fontsize=8)
-    return drawn
+    return for_print(drawn, layout)
 
 
 def _add_colours(drawn: Figure, column: Any, other: str) -> None:

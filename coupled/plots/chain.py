@@ -97,7 +97,7 @@ def _caption(found: StageResult | None) -> str:
 
 def _draw_residual(axes: Any, view: View, output: Output, wide: bool) -> None:
     """Draw a residual over time, before and after (`wide`), or what is left of it alone."""
-    scale, unit = residual_shown(output.channel)
+    scale, unit = residual_shown(output.channel, view.system)
     factor, time = scale * output.floor, view.time(output)
     before = factor * output.residual(view.diagnosis.nominal)
     after = factor * output.residual(view.diagnosis.improved)

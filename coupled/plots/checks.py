@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 
 from coupled.calibration.checks import Swing, swing_of
 from coupled.campaign.tolerances import TIME_SHARE, SURFACE_rad, force_band
+from coupled.display import System, in_system
 from coupled.plots.pages import (
     BLUE,
     ORANGE,
@@ -27,9 +28,9 @@ if TYPE_CHECKING:
     from coupled.calibration.sweeps import Release
 
 
-def draw_static_checks(found: Documentation) -> Figure:
+def draw_static_checks(found: Documentation, system: System = "si") -> Figure:
     """Draw the static control check: force, and surface, within their tolerance bands."""
-    factor, unit = scale(found.control)
+    (factor, unit), newtons = scale(found.control, system), in_system("N", system)
     data = found.rig.controls[found.control]
     rows = 1 if found.surface_rad is None else 2
     figure, grid = case_panels(rows, len(found.conditions), 3.0)
@@ -37,18 +38,19 @@ def draw_static_checks(found: Documentation) -> Figure:
         axes = grid[0, i]
         for leg, name in zip(condition.specified, ("tolerance", "", "", ""), strict=True):
             x, f = factor * leg.deflection, leg.force
-            allowed = force_band(found.control, f)
+            f, allowed = newtons.factor * f, newtons.factor * force_band(found.control, f)
             axes.fill_between(
                 x, f - allowed, f + allowed, color="0.85", linewidth=0, label=name or None
             )
         response = condition.felt
         x = factor * response.deflection
-        axes.plot(x, response.hand_force, color=BLUE, linewidth=1.2, label="rig")
+        axes.plot(x, newtons.factor * response.hand_force, color=BLUE, linewidth=1.2, label="rig")
         for leg, name in zip(condition.specified, leg_names(condition), strict=True):
             x = factor * leg.deflection
             style = "k." if leg.read else "k:"
-            axes.plot(x, leg.force, style, linewidth=1.0, label=name or None)
-        axes.set_title(_verdict(found, condition.pressure_Pa, ("breakout", "force")), fontsize=9)
+            axes.plot(x, newtons.factor * leg.force, style, linewidth=1.0, label=name or None)
+        said = _verdict(found, condition.pressure_Pa, ("breakout", "force"), system)
+        axes.set_title(said, fontsize=9)
         if found.surface_rad is not None:
             ends = np.array([-1.0, 1.0])
             degrees = found.surface_rad / DEGREE_rad * ends
@@ -60,12 +62,13 @@ def draw_static_checks(found: Documentation) -> Figure:
             moved = side * response.surface * found.surface_rad / DEGREE_rad
             below.plot(factor * response.deflection, moved, color=BLUE, linewidth=1.2)
             below.plot(x, degrees, "k:", linewidth=1.0)
-            below.set_title(_verdict(found, condition.pressure_Pa, ("surface",)), fontsize=9)
+            said = _verdict(found, condition.pressure_Pa, ("surface",), system)
+            below.set_title(said, fontsize=9)
         for panel in grid[:, i]:
             panel.grid(alpha=0.25)
         for panel in grid[:, i] if len(found.conditions) == 1 else grid[-1:, i]:
             panel.set_xlabel(f"true deflection δ, {unit}")
-    grid[0, 0].set_ylabel("force at the grip F, N")
+    grid[0, 0].set_ylabel(f"force at the grip F, {newtons.unit}")
     if rows > 1:
         grid[1, 0].set_ylabel(f"{data.surface} from trim, °")
     what = "static control check, 14 CFR Part 60, 2.a"
@@ -74,7 +77,7 @@ def draw_static_checks(found: Documentation) -> Figure:
     return figure
 
 
-def _verdict(found: Documentation, pressure_Pa: float, kinds: Sequence[str]) -> str:
+def _verdict(found: Documentation, pressure_Pa: float, kinds: Sequence[str], system: System) -> str:
     """Return the q̄, and whether the checks of these kinds pass there, the least margin named."""
     ours = [
         check
@@ -82,14 +85,14 @@ def _verdict(found: Documentation, pressure_Pa: float, kinds: Sequence[str]) -> 
         if check.pressure_Pa == pressure_Pa and check.name.split(",")[0].split(" ")[0] in kinds
     ]
     if not ours:
-        return f"{pressure(pressure_Pa)}: not judged"
+        return f"{pressure(pressure_Pa, system)}: not judged"
     worst = min(ours, key=lambda check: check.margin)
     word = "pass" if worst.passed else "FAIL"
     margin = f"{100 * worst.margin:.{0 if abs(worst.margin) >= 0.01 else 1}f}".replace("-", "−")
-    return f"{pressure(pressure_Pa)}: {word}, least margin {margin} %"
+    return f"{pressure(pressure_Pa, system)}: {word}, least margin {margin} %"
 
 
-def draw_releases(found: Documentation) -> Figure:
+def draw_releases(found: Documentation, system: System = "si") -> Figure:
     """Draw the dynamic control check: releases, with the tolerance of crossings and overshoots."""
     figure, grid = case_panels(2, len(found.conditions), 2.7)
     for i, condition in enumerate(found.conditions):
@@ -111,7 +114,8 @@ def draw_releases(found: Documentation) -> Figure:
             kinds = [c for c in kinds if c.name.endswith(side) and c.unit in ("s", "%", "")]
             worst = min(kinds, key=lambda check: check.margin)
             word = "pass" if worst.passed else f"FAIL: {worst.name.removesuffix(', ' + side)}"
-            axes.set_title(f"{pressure(condition.pressure_Pa)}, {side}: {word}", fontsize=9)
+            place = pressure(condition.pressure_Pa, system)
+            axes.set_title(f"{place}, {side}: {word}", fontsize=9)
             axes.set_xlim(-swing.begin_s, _span(wanted, swing))
         for axes in grid[:, i] if len(found.conditions) == 1 else grid[-1:, i]:
             axes.set_xlabel("time from 90 % of the displacement, s")

@@ -9,7 +9,15 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from coupled.calibration.documentation import Documentation
-from coupled.calibration.qualification import FeelTest, Issue, Kind, cover_rows, feel_tests, written
+from coupled.calibration.qualification import (
+    FeelTest,
+    Issue,
+    Kind,
+    check_numbers,
+    cover_rows,
+    feel_tests,
+)
+from coupled.display import System, pressure_in, pressure_shown
 from coupled.plots.histories import plain
 from coupled.record.channels import ControlName
 from coupled.version import __version__
@@ -50,28 +58,28 @@ def _rule(start: float, end: float, y: float) -> Line2D:
 
 
 def draw_check_table(
-    documents: Sequence[Documentation], issue: Issue, numbers: Numbers
+    documents: Sequence[Documentation], issue: Issue, numbers: Numbers, system: System = "si"
 ) -> list[Figure]:
     """Draw the table of all checks; `numbers` are those of the figures that show them."""
     rows = [
         row
         for found in documents
-        for test in feel_tests(found, issue.reference)
-        for row in _rows(test, numbers[found.control, test.kind])
+        for test in feel_tests(found, issue.reference, system)
+        for row in _rows(test, numbers[found.control, test.kind], system)
     ]
     pages = [rows[i : i + _ROWS] for i in range(0, len(rows), _ROWS)]
-    return [_page(part, f"Checks, {i} of {len(pages)}") for i, part in enumerate(pages, 1)]
+    heads = tuple(h.replace("kPa", pressure_shown(system).unit) for h in _HEADS)
+    return [_page(part, heads, f"Checks, {i} of {len(pages)}") for i, part in enumerate(pages, 1)]
 
 
-def _rows(test: FeelTest, number: int) -> list[tuple[str, ...]]:
+def _rows(test: FeelTest, number: int, system: System) -> list[tuple[str, ...]]:
     return [
         (
             test.number,
             test.control,
-            f"{check.pressure_Pa / 1000:.2f}",
+            pressure_in(check.pressure_Pa, system).partition(" ")[0],
             check.name,
-            *(written(x) for x in (check.measured, check.reference, check.tolerance)),
-            check.unit,
+            *check_numbers(check, system),
             "pass" if check.passed else "FAIL",
             str(number),
         )
@@ -79,11 +87,11 @@ def _rows(test: FeelTest, number: int) -> list[tuple[str, ...]]:
     ]
 
 
-def _page(rows: Sequence[Sequence[str]], head: str) -> Figure:
+def _page(rows: Sequence[Sequence[str]], heads: Sequence[str], head: str) -> Figure:
     figure = Figure(figsize=PAGE)
     figure.text(_AT[0], 0.95, head, fontsize=14, weight="bold")
-    for row, y in zip((_HEADS, *rows), (0.915 - k * _LINE * 1.1 for k in range(99)), strict=False):
-        bold = "bold" if row is _HEADS else "normal"
+    for row, y in zip((heads, *rows), (0.915 - k * _LINE * 1.1 for k in range(99)), strict=False):
+        bold = "bold" if row is heads else "normal"
         for text, x, right in zip(row, _AT, _RIGHTS, strict=True):
             side = "right" if right else "left"
             color = "#b42318" if text == "FAIL" else "black"

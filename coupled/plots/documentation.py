@@ -12,6 +12,7 @@ from matplotlib.backends.backend_pdf import PdfPages
 from matplotlib.figure import Figure
 
 from coupled.calibration.qualification import Issue, Kind
+from coupled.display import System, in_system
 from coupled.files import write_whole
 from coupled.plots.checks import draw_releases, draw_static_checks
 from coupled.plots.cover import draw_check_table, draw_cover
@@ -53,9 +54,9 @@ def _in_inches(axes: Any) -> None:
     other.tick_params(labelsize=7)
 
 
-def draw_forces(found: Documentation) -> Figure:
+def draw_forces(found: Documentation, system: System = "si") -> Figure:
     """Draw force against true deflection at each q̄, swept both ways."""
-    factor, unit = scale(found.control)
+    (factor, unit), newtons = scale(found.control, system), in_system("N", system)
     figure, grid = panels(1, len(found.conditions), 3.5)
     for axes, condition in zip(grid[0], found.conditions, strict=True):
         sweeps = (
@@ -64,32 +65,35 @@ def draw_forces(found: Documentation) -> Figure:
         )
         for name, response, color, width in sweeps:
             x = factor * response.deflection
-            axes.plot(x, response.hand_force, color=color, linewidth=width, label=name)
+            axes.plot(
+                x, newtons.factor * response.hand_force, color=color, linewidth=width, label=name
+            )
         for leg, name in zip(condition.specified, leg_names(condition), strict=True):
             x, style = factor * leg.deflection, {"color": GRAY, "linewidth": 4.5, "zorder": 1}
             marks = {"linestyle": "", "marker": "o"} if leg.read else {}
-            axes.plot(x, leg.force, label=name or None, **style, **marks)
-        axes.set_title(pressure(condition.pressure_Pa), fontsize=10)
+            axes.plot(x, newtons.factor * leg.force, label=name or None, **style, **marks)
+        axes.set_title(pressure(condition.pressure_Pa, system), fontsize=10)
         axes.set_xlabel(f"true deflection δ, {unit}")
         axes.grid(alpha=0.25)
-        _in_pounds(axes)
+        if system == "si":
+            _in_pounds(axes)
         if unit == "cm":
             _in_inches(axes)
-    grid[0, 0].set_ylabel("force at the grip F, N")
+    grid[0, 0].set_ylabel(f"force at the grip F, {newtons.unit}")
     figure.suptitle(title(found, "force against deflection, slow sweep both ways"), fontsize=12)
     with_legend(figure, grid[0, 0], 3)
     return figure
 
 
-def draw_deflections(found: Documentation) -> Figure:
+def draw_deflections(found: Documentation, system: System = "si") -> Figure:
     """Draw computed against true deflection, and what the host's estimate lacks."""
-    factor, unit = scale(found.control)
+    factor, unit = scale(found.control, system)
     travel = found.rig.controls[found.control].travel
     figure, grid = panels(1, 2, 3.7)
     left, right = grid[0]
     for condition, color in zip(found.conditions, cycle((BLUE, ORANGE, GREEN)), strict=False):
         bent = condition.compensated
-        name = pressure(condition.pressure_Pa)
+        name = pressure(condition.pressure_Pa, system)
         left.plot(
             factor * bent.deflection, factor * bent.computed, color=color, linewidth=1.3, label=name
         )
@@ -139,20 +143,21 @@ def draw_pages(
     issue: Issue,
     folder: Path,
     pdf: Path,
+    system: System = "si",
 ) -> list[Path]:
     """Draw each control's pages as PNG in a folder; the PDF has a cover and the checks before."""
     pages: dict[Path, Figure] = {}
     numbers: dict[tuple[ControlName, Kind], int] = {}
     for found in documents:
         drawn = {
-            "forces": draw_forces(found),
-            "deflections": draw_deflections(found),
-            "static": draw_static_checks(found),
-            "release": draw_releases(found),
+            "forces": draw_forces(found, system),
+            "deflections": draw_deflections(found, system),
+            "static": draw_static_checks(found, system),
+            "release": draw_releases(found, system),
         }
         fit = fits.get(found.control)
         if fit is not None:
-            drawn["readings"] = draw_readings(*fit)
+            drawn["readings"] = draw_readings(*fit, system)
         order = {name: number for number, name in enumerate(drawn, len(pages) + 1)}
         numbers[found.control, "static"] = order["static"]
         numbers[found.control, "release"] = order["release"]
@@ -164,6 +169,6 @@ def draw_pages(
             path,
             guess_note(documents[0].rig.controls, [found.control for found in documents]),
         )
-    before = [draw_cover(documents, issue), *draw_check_table(documents, issue, numbers)]
+    before = [draw_cover(documents, issue), *draw_check_table(documents, issue, numbers, system)]
     save_pages([*before, *pages.values()], pdf)
     return list(pages)

@@ -11,10 +11,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from coupled.authority.figures import corrects_nothing, named, remarks
+from coupled.authority.figures import corrects_nothing, guessed, named, remarks
 from coupled.authority.held import true_deflection
 from coupled.display import Shown, System, in_system, parameter_label
+from coupled.errors import InputError, listed
 from coupled.plots.histories import legend_above, plain
+from coupled.plots.layout import Layout, for_print
 from coupled.plots.pages import scale
 from coupled.record.channels import RATE, channel
 from coupled.rig.equations import specified_force
@@ -23,6 +25,7 @@ from coupled.units import DEGREE_rad
 
 if TYPE_CHECKING:
     from coupled.authority.compare import Flight
+    from coupled.flight.manoeuvre import Manoeuvre
 
 _STYLE = {
     "rigid": ("black", (0, (1, 1)), 2.2),
@@ -33,52 +36,145 @@ _STYLE = {
     "calibrated low": ("#e69f00", "dashdot", 1.6),
 }
 _IN_A_ROW, _WIDE = 6, 18  # names in a row of the legend, and letters of one that need more room
+_ONE_LINE = 0.01  # of the panel's span, within which curves are one line to the eye
+_MANY = 3  # curves that coincide
+_PALER = 0.45  # of a later case's curves, overlaid
+_LONGEST_END = 30  # letters of a flight's end
+_USUAL = Layout()
 _FELT = 0.01  # of the force: a step below that is felt by no hand
 _SHORT = ("rigid", "uncomp.", "defl. only", "grad. only", "comp.", "cal. low")
 
 
-def draw_comparison(flights: Sequence[Flight], system: System = "si") -> Figure:
+def panels_of(manoeuvre: Manoeuvre) -> list[str]:
+    """Return the panels that a comparison's figure may have."""
+    flown = manoeuvre.rig.flight is not None
+    return ["surface", *(["motion"] if flown else []), "force", "loss"]
+
+
+def draw_comparison(
+    flights: Sequence[Flight], system: System = "si", layout: Layout = _USUAL
+) -> Figure:
     """Draw a comparison: a column a case; surface, motion, force, and what is lost.
 
-    Deflections and forces are in the units of a system.
+    Deflections and forces are in the units of a system. The layout may name some of `panels_of`,
+    and overlay the cases in the same axes, each paler than the one before.
 
     Where each case is flown in one configuration only, and the hand feels the modifying force
-    step, draw a panel a case, of these steps.
+    step, draw a panel a case, of these steps, unless the layout names panels.
+
+    Raises InputError for a panel that is not there.
     """
     cases = [list(group) for _, group in groupby(flights, key=lambda f: f.outcome.case)]
-    if len(cases) > 1 and all(len(case) == 1 for case in cases) and _steps_are_felt(flights):
-        return _draw_step_panels(cases, system)
-    flown = flights[0].manoeuvre.rig.flight is not None
-    force = partial(_draw_force, system=system)
-    rows: list[Callable[[Any, Sequence[Flight]], None]]
-    rows = [_draw_surface, *([_draw_motion] if flown else []), force, _draw_loss]
-    columns, height = (len(cases), len(rows)) if len(cases) > 1 else (2, 2)
-    figure = Figure(figsize=(1.2 + 3.9 * columns, 0.9 + 2.6 * height), layout="constrained")
-    grid = figure.subplots(height, columns, squeeze=False)
-    if len(cases) == 1:
-        for axes in list(grid.flat)[len(rows) :]:
-            axes.set_visible(False)
-        grid = np.reshape(list(grid.flat)[: len(rows)], (len(rows), 1))
+    once = len(cases) > 1 and all(len(case) == 1 for case in cases)
+    if once and not layout.panels and not layout.overlay and _steps_are_felt(flights):
+        return for_print(_draw_step_panels(cases, system, layout), layout)
+    rows: dict[str, Callable[[Any, Sequence[Flight]], None]]
+    rows = {"surface": _draw_surface, "motion": _draw_motion, "loss": _draw_loss}
+    rows["force"] = partial(_draw_force, system=system)
+    names = layout.chosen(panels_of(flights[0].manoeuvre))
+    if layout.overlay and len(cases) > 1:
+        names = [name for name in names if name != "loss"]  # bars of several cases hide each other
+        if not names:
+            raise InputError("--overlay", "", "bars of several cases hide each other")
+    columns = 1 if layout.overlay else len(cases)
+    grid, figure = _panels(len(names), columns, layout)
     for i, case in enumerate(cases):
-        for axes, draw in zip(grid[:, i], rows, strict=True):
-            draw(axes, case)
+        for axes, name in zip(grid[:, 0 if layout.overlay else i], names, strict=True):
+            before = len(axes.lines)
+            rows[name](axes, case)
+            if layout.overlay and i:
+                _fade(axes.lines[before:], i)
             axes.grid(alpha=0.25)
-            if i:
-                axes.set_ylabel("")
-        if len(cases) > 1:
+            if not layout.overlay:
+                axes.set_ylabel(axes.get_ylabel() if i == 0 else "")
+        if columns > 1:
             grid[0, i].set_title(_wrapped(case[0].outcome.case), fontsize=10)
     _share_limits(grid[-1])
-    said = [
-        line
-        for each in remarks(flights, system)
-        for line in _wrapped(each, 65 * columns).split("\n")
-    ]
-    figure.suptitle("\n".join([_title(flights[0]), *said]), fontsize=9 if said else 12)
+    # In print a caption explains; what is a guess stays marked.
+    printed = layout.size_in is not None
+    lines = [guessed(flights)] if printed else remarks(flights, system)
+    lines = [*filter(None, lines), *_coincident(cases, names)]
+    if layout.overlay and len(cases) > 1:
+        lines.append(f"From strong to pale: {'; '.join(case[0].outcome.case for case in cases)}.")
+    width = 65 * max(columns, 2 if len(names) > 1 else 1)
+    said = [line for each in lines for line in _wrapped(each, width).split("\n")]
+    title = [] if printed else [_title(flights[0])]
+    figure.suptitle("\n".join([*title, *said]), fontsize=9 if said else 12)
     handles, labels = grid[0, 0].get_legend_handles_labels()
-    wide = max(map(len, labels)) > _WIDE or len(labels) > _IN_A_ROW
-    ncols = _IN_A_ROW // 2 if wide else _IN_A_ROW
-    figure.legend(handles, labels, loc="outside lower center", ncols=ncols, fontsize=9)
-    return figure
+    shown = dict(zip(labels, handles, strict=True))
+    if "loss" not in names[:1]:
+        wide = max(map(len, shown)) > _WIDE or len(shown) > _IN_A_ROW
+        ncols = _IN_A_ROW // 2 if wide else _IN_A_ROW
+        figure.legend(
+            list(shown.values()), list(shown), loc="outside lower center", ncols=ncols, fontsize=9
+        )
+    return for_print(figure, layout)
+
+
+def _panels(rows: int, columns: int, layout: Layout) -> tuple[Any, Figure]:
+    """Return axes by row and column, and their figure; the rows of a single column in a square."""
+    across, down = (columns, rows) if columns > 1 else (min(2, rows), -(-rows // 2))
+    width, height = layout.size(1.2 + 3.9 * across, 0.9 + 2.6 * down)
+    if layout.size_in is not None and columns == 1 and height > width:
+        across, down = 1, rows
+    figure = Figure(figsize=(width, height), layout="constrained")
+    grid = figure.subplots(down, across, squeeze=False)
+    if columns > 1:
+        return grid, figure
+    for axes in list(grid.flat)[rows:]:
+        axes.set_visible(False)
+    return np.reshape(list(grid.flat)[:rows], (rows, 1)), figure
+
+
+def _fade(lines: Sequence[Any], number: int) -> None:
+    """Draw the lines of a later case paler, without a name of their own."""
+    for line in lines:
+        line.set_alpha(_PALER**number)
+        line.set_label("")
+
+
+def _coincident(cases: Sequence[Sequence[Flight]], names: Sequence[str]) -> list[str]:
+    """Return which configurations' curves lie on one another, a sentence a panel.
+
+    Only three or more are named: of two, the dashed one shows the other.
+    """
+    said = []
+    for name in names:
+        found = [group for case in cases for group in _same_curves(case, name)]
+        for group in dict.fromkeys(found):
+            where = " in some cases" if found.count(group) < len(cases) else ""
+            curves = f"{listed(group[:-1])} and {group[-1]}"
+            said.append(f"{name.capitalize()}: the curves of {curves} coincide{where}.")
+    return said
+
+
+def _same_curves(case: Sequence[Flight], panel: str) -> list[tuple[str, ...]]:
+    """Return the groups of three or more configurations with the same curve in a panel."""
+    if panel == "loss":
+        return []
+    groups: list[tuple[list[str], Any]] = []
+    curves = [_curve(flight, panel) for flight in case]
+    spans = np.max([np.ptp(curve, axis=1) for curve in curves], axis=0)[:, None]
+    for flight, curve in zip(case, curves, strict=True):
+        for names, other in groups:
+            alike = curve.shape == other.shape
+            if alike and np.all(np.abs(curve - other) <= _ONE_LINE * spans):
+                names.append(named(flight))
+                break
+        else:
+            groups.append(([named(flight)], curve))
+    return [tuple(names) for names, _ in groups if len(names) >= _MANY]
+
+
+def _curve(flight: Flight, panel: str) -> Any:
+    """Return what a panel draws of a flight over time, shape (channels, rows)."""
+    manoeuvre, record, control = flight.manoeuvre, flight.record, flight.manoeuvre.control
+    if panel == "surface":
+        return record[channel(control, "surface_norm")][None]
+    if panel == "motion":
+        return record[manoeuvre.measure.drawn or RATE[control]][None]
+    moved = true_deflection(manoeuvre.rig, control, record)
+    return np.stack((moved, record[channel(control, "hand_force")]))
 
 
 def _steps_are_felt(flights: Sequence[Flight]) -> bool:
@@ -86,11 +182,12 @@ def _steps_are_felt(flights: Sequence[Flight]) -> bool:
     return any(f.outcome.force_step_N > _FELT * f.outcome.force_N for f in flights)
 
 
-def _draw_step_panels(cases: Sequence[Sequence[Flight]], system: System) -> Figure:
+def _draw_step_panels(cases: Sequence[Sequence[Flight]], system: System, layout: Layout) -> Figure:
     unit = in_system("N", system)
     columns = min(3, len(cases))
     rows = -(-len(cases) // columns)
-    figure = Figure(figsize=(1.0 + 3.4 * columns, 0.7 + 2.7 * rows), layout="constrained")
+    size = layout.size(1.0 + 3.4 * columns, 0.7 + 2.7 * rows)
+    figure = Figure(figsize=size, layout="constrained")
     grid = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
     for axes, case in zip(grid.flat, cases, strict=False):
         _draw_steps(axes, case, unit)
@@ -163,6 +260,7 @@ def _draw_motion(axes: Any, case: Sequence[Flight]) -> None:
     if drawn is not None:
         for flight in case:
             axes.plot(flight.record.time_s, flight.record[drawn], **_line(flight))
+        _mark_ends(axes, case, drawn)
         axes.set_xlabel("time, s")
         axes.set_ylabel(parameter_label(drawn))
         return
@@ -170,9 +268,25 @@ def _draw_motion(axes: Any, case: Sequence[Flight]) -> None:
     for flight in case:
         rate = flight.record[name] / DEGREE_rad
         axes.plot(flight.record.time_s, rate, **_line(flight))
+    _mark_ends(axes, case, name, 1.0 / DEGREE_rad)
     axes.set_xlabel("time, s")
     _show_from_the_pull(axes, case)
     axes.set_ylabel(f"{name.removesuffix('_rad_per_s').replace('_', ' ')}, °/s")
+
+
+def _mark_ends(axes: Any, case: Sequence[Flight], name: str, factor: float = 1.0) -> None:
+    """Put a cross where a flight ended before its time, and each reason once."""
+    reasons: dict[str, tuple[float, float]] = {}
+    for flight in case:
+        if flight.ended_early:
+            place = (float(flight.record.time_s[-1]), factor * float(flight.record[name][-1]))
+            style = {"color": _STYLE[flight.configuration][0], "clip_on": False}
+            axes.plot(*place, "x", markersize=8, markeredgewidth=2.0, **style)
+            why = flight.ended_early.partition(" at ")[0].removeprefix("the aircraft ")
+            reasons[why] = max(place, reasons.get(why, place))
+    for why, place in reasons.items():
+        text = plain(why[:_LONGEST_END])
+        axes.annotate(text, place, (7, 4), textcoords="offset points", fontsize=8)
 
 
 def _draw_force(axes: Any, case: Sequence[Flight], system: System) -> None:
@@ -189,7 +303,8 @@ def _draw_force(axes: Any, case: Sequence[Flight], system: System) -> None:
     line = np.linspace(0.0, deflection[peak], 50)
     pressure = float(record["dynamic_pressure_Pa"][peak])
     wanted = specified_force(case[0].manoeuvre.rig, control, pressure, line)
-    axes.plot(size * line, newtons.factor * wanted, color="0.65", linewidth=4.5, zorder=0)
+    style = {"color": "0.65", "linewidth": 4.5, "zorder": 0, "label": "asked, specified"}
+    axes.plot(size * line, newtons.factor * wanted, **style)
     axes.set_xlabel(f"true deflection of the {control}, {unit}")
     axes.set_ylabel(f"pilot's force, {newtons.unit}")
 

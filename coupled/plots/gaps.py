@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from matplotlib.figure import Figure
 
+from coupled.display import System
 from coupled.gap.findings.diagnosis import Diagnosis
 from coupled.plots.chain import draw_stages
 from coupled.plots.gapview import View
@@ -17,7 +18,7 @@ FIGURES = {
 }
 
 
-def draw_diagnosis(diagnosis: Diagnosis) -> dict[str, Figure]:
-    """Draw a diagnosis: the figures by their files' names."""
-    view = View(diagnosis)
+def draw_diagnosis(diagnosis: Diagnosis, system: System = "si") -> dict[str, Figure]:
+    """Draw a diagnosis in the units of a system: the figures by their files' names."""
+    view = View(diagnosis, system)
     return {name: draw(view) for name, draw in FIGURES.items()}

@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from coupled.display import System, unit_in
+from coupled.display import shown as shown_in
 from coupled.gap.chain import stage_of
 from coupled.gap.effects.effect import Effect
 from coupled.gap.findings.diagnosis import Diagnosis
@@ -58,17 +60,20 @@ _LABELS = {
 }
 
 
-def unit_shown(name: str) -> tuple[float, str]:
+def unit_shown(name: str, system: System = "si") -> tuple[float, str]:
     """Return the factor and the unit in which a channel is drawn."""
+    if system == "us" and unit_in(name):
+        unit = shown_in(name, system)
+        return unit.factor, unit.unit
     for ending, shown in _UNITS.items():
         if name.endswith("_" + ending):
             return shown
     return 1.0, "g" if name == "load_factor" else "1"
 
 
-def residual_shown(name: str) -> tuple[float, str]:
+def residual_shown(name: str, system: System = "si") -> tuple[float, str]:
     """Return the factor and the unit in which a channel's residual is drawn: small, so mm."""
-    factor, unit = unit_shown(name)
+    factor, unit = unit_shown(name, system)
     return (10.0 * factor, "mm") if unit == "cm" else (factor, unit)
 
 
@@ -95,9 +100,10 @@ def style_of(kind: str) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class View:
-    """A diagnosis and its records, as the figures ask for it."""
+    """A diagnosis and its records, as the figures ask for it, and the units that they have."""
 
     diagnosis: Diagnosis
+    system: System = "si"
 
     @property
     def records(self) -> tuple[Record, ...]:

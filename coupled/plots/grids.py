@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import polars as pl
 from matplotlib import colormaps
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from coupled.campaign.entry import AS_FILED
 from coupled.display import System, parameter_label
+from coupled.errors import InputError
 from coupled.plots.histories import plain
+from coupled.plots.layout import Layout
 from coupled.plots.sweepview import Shown, is_logarithmic, mark_ended, place_of, titled
 
+Dashes = Literal["-", "--", ":", "-."]
 _MOST_LINES = 8
+_STYLES: tuple[Dashes, ...] = ("-", "--", ":", "-.")
+_USUAL = Layout()
 _MARKS = "os^Dv<>p"
 
 
@@ -34,37 +40,52 @@ def draw_grid(
     figures: Sequence[str],
     heading: tuple[str, str],
     system: System = "si",
+    layout: Layout = _USUAL,
 ) -> Figure:
     """Draw a row a figure, a column a configuration; the longer parameter along the bottom.
 
-    `heading` is the title, and a remark below it.
+    `heading` is the title, and a remark below it. Overlaid, configurations are styles of lines in
+    one column. Raises InputError for maps overlaid.
     """
     along, other = sorted(keys, key=lambda key: -found[key].n_unique())
     configurations = found["configuration"].unique(maintain_order=True).to_list()
-    size = (max(1.6 + 3.1 * len(configurations), 6.0), 1.5 + 2.4 * len(figures))
-    drawn = Figure(figsize=size, layout="constrained")
     as_lines = found[other].n_unique() <= _MOST_LINES
+    if layout.overlay and not as_lines:
+        raise InputError("--overlay", "", "the figure is of maps, which hide each other")
+    columns = 1 if layout.overlay else len(configurations)
+    size = layout.size(max(1.6 + 3.1 * columns, 6.0), 1.5 + 2.4 * len(figures))
+    drawn = Figure(figsize=size, layout="constrained")
     ended = not as_lines and bool((found["ended_early"] != "").any())
     title = titled(*heading, size[0])
     drawn.suptitle(f"{title}\ngray: ended early" if ended else title, fontsize=11)
-    panels = drawn.subplots(
-        len(figures), len(configurations), squeeze=False, sharex=True, sharey="row"
-    )
+    panels = drawn.subplots(len(figures), columns, squeeze=False, sharex=True, sharey="row")
     for row, name in zip(panels, figures, strict=True):
         shown = Shown.of(name, system)
         if as_lines:
-            for axes, configuration in zip(row, configurations, strict=True):
+            for i, configuration in enumerate(configurations):
                 rows = found.filter(pl.col("configuration") == configuration)
-                _draw_lines(axes, rows, along, other, shown)
+                axes = row[0 if layout.overlay else i]
+                style = _STYLES[i % len(_STYLES)] if layout.overlay else "-"
+                _draw_lines(axes, rows, along, other, shown, style)
             row[0].set_ylabel(shown.label)
         else:
             _draw_maps(drawn, row, found, along, other, shown)
-    for axes, configuration in zip(panels[0], configurations, strict=True):
+    titles = [""] if layout.overlay else configurations
+    for axes, configuration in zip(panels[0], titles, strict=True):
         axes.set_title("" if configuration == AS_FILED else plain(configuration), fontsize=10)
     for axes in panels[-1]:
         place_of(axes, along, found[along])
     if as_lines:
         handles, labels = panels[0, 0].get_legend_handles_labels()
+        named = dict(zip(reversed(labels), reversed(handles), strict=True))  # of the first style
+        labels = list(dict.fromkeys(labels))
+        handles = [named[label] for label in labels]
+        if layout.overlay:
+            handles += [
+                Line2D([], [], color="black", linestyle=_STYLES[i % len(_STYLES)])
+                for i in range(len(configurations))
+            ]
+            labels += configurations
         drawn.legend(
             handles,
             labels,
@@ -77,12 +98,15 @@ def draw_grid(
     return drawn
 
 
-def _draw_lines(axes: Any, rows: pl.DataFrame, along: str, other: str, shown: Shown) -> None:
+def _draw_lines(
+    axes: Any, rows: pl.DataFrame, along: str, other: str, shown: Shown, dashes: str
+) -> None:
     values = rows[other].unique().sort().to_list()
     colours = colormaps["viridis"](np.linspace(0.0, 0.88, len(values)))
     for value, colour, mark in zip(values, colours, _MARKS, strict=False):
         line = rows.filter((pl.col(other) == value) & (pl.col("ended_early") == "")).sort(along)
         style = {"color": colour, "marker": mark, "markersize": 3.5, "linewidth": 1.2}
+        style["linestyle"] = dashes
         axes.plot(line[along], shown.of_rows(line), label=f"{value:.4g}", **style)
     mark_ended(axes, np.asarray(rows.filter(pl.col("ended_early") != "")[along]))
     axes.grid(alpha=0.25)

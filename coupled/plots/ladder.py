@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from coupled.display import split_unit
 from coupled.gap.chain import CHAIN, stage_of
 from coupled.gap.effects.library import EFFECTS
 from coupled.gap.findings.summary import figure as written
-from coupled.gap.findings.summary import plain
+from coupled.gap.findings.summary import in_units, plain
 from coupled.gap.search.found import Found
 from coupled.gap.signals.output import stage_gaps
 from coupled.gap.thresholds import RIVAL_GAIN
@@ -246,10 +247,12 @@ def _numbers(view: View) -> list[tuple[str, str, str]]:
     lines = []
     for effect in view.diagnosis.effects:
         lines.append((f"{plain(effect.name)}, p = {effect.probability:.2f}", "", ""))
-        for p in effect.parameters:
+        for p in (in_units(each, view.system) for each in effect.parameters):
             interval = p.interval(written) or "not determined"
             value = f"{written(p.found)} {p.unit}".rstrip()
-            lines.append((f"    {p.key.rpartition('.')[2]}", value, interval))
+            key = p.key.rpartition(".")[2]
+            name = key if view.system == "si" else split_unit(key)[0].replace("_", " ")
+            lines.append((f"    {name}", value, interval))
     return lines
 
 

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
+import textwrap
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from scipy.spatial import ConvexHull, QhullError
+from scipy.spatial import ConvexHull, Delaunay, QhullError
 
-from coupled.display import Shown, System, in_system
+from coupled.display import System, in_system, pressure_shown
 from coupled.plots.pages import BLUE, GRAY, GREEN, ORANGE, panels, scale, with_legend
 from coupled.record.channels import ControlName
 from coupled.units import POUND_N, KNOT_m_per_s
@@ -18,6 +20,10 @@ from coupled.units import POUND_N, KNOT_m_per_s
 if TYPE_CHECKING:
     from coupled.authority.maps import Feel, Floats, LossMap
 
+_NO_LOSS = 5e-4  # a share that rounds to 0.0 %
+_NEUTRAL = 0.1  # of the greatest deflection flown, below which a control is near neutral
+_GAINS_percent = 0.5  # below zero, from where colours have two signs
+_LETTERS_per_inch = 13.0  # of a title
 _STYLES = {
     "rigid": ("specified", GRAY, "solid", 4.5),
     "uncompensated": ("felt uncompensated", ORANGE, "solid", 1.5),
@@ -31,36 +37,118 @@ def draw_losses(
     flown: Mapping[ControlName, Floats],
     system: System = "si",
 ) -> Figure:
-    """Draw the loss of each control (rows) in each configuration (columns)."""
-    figure, grid = panels(len(maps), 4, 2.9)
-    pressure = _pressure(system)
-    for row, (control, of_control) in zip(grid, maps.items(), strict=True):
-        factor, unit = scale(control, system)
-        losses = np.concatenate([m.loss[np.isfinite(m.loss)] for m in of_control])
-        least = float(np.min(losses, initial=0.0))
-        most = 100.0 * max(0.01, float(np.max(losses, initial=0.0)), -least)
-        for axes, loss_map in zip(row, of_control, strict=True):
-            mesh = axes.pcolormesh(
-                pressure.factor * loss_map.pressure_Pa,
-                factor * loss_map.deflection,
-                100.0 * loss_map.loss.T,
-                cmap="RdBu_r" if least < -0.005 else "Reds",
-                vmin=-most if least < -0.005 else 0.0,
-                vmax=most,
-                shading="gouraud",
-            )
-            _outline(axes, flown[control], (pressure.factor, factor))
-            axes.set_facecolor(GRAY)  # no loss: the loader rests, or the grip does not go so far
-            axes.set_ylim(0.0, factor * loss_map.deflection[-1])
-            axes.set_title(f"{control}, {loss_map.configuration}", fontsize=10)
-            axes.set_xlabel(f"dynamic pressure q̄, {pressure.unit}")
-        row[0].set_ylabel(f"true deflection δ, {unit}")
-        figure.colorbar(mesh, ax=list(row), label="loss, % of δ")
-    outlined = "; line: what was flown" if any(f.size for f in flown.values()) else ""
-    within = _grey(maps)
-    note = f" ({(within + outlined).removeprefix('; ')})" if within or outlined else ""
-    figure.suptitle(f"{name}: deflection lost on the way to the surface{note}", fontsize=12)
+    """Draw the loss of each control (rows) in each configuration (columns).
+
+    The colours of a row go as far as the losses in what was flown, of all deflections without
+    flights. A map without any loss is not drawn: the title names it.
+    """
+    drawn = {control: [m for m in of_control if _loses(m)] for control, of_control in maps.items()}
+    drawn = {control: kept for control, kept in drawn.items() if kept}
+    order = [m.configuration for of_control in maps.values() for m in of_control]
+    there = {m.configuration for kept in drawn.values() for m in kept}
+    columns = [each for each in dict.fromkeys(order) if each in there]
+    figure, grid = panels(max(1, len(drawn)), max(1, len(columns)), 2.9)
+    for axes in grid.flat:
+        axes.set_visible(False)
+    for row, (control, of_control) in zip(grid, drawn.items(), strict=False):
+        places = dict(zip(columns, row, strict=True))
+        ours = [(places[loss_map.configuration], loss_map) for loss_map in of_control]
+        _draw_row(figure, ours, flown[control], system)
+    outlined = "line: what was flown" if any(f.size for f in flown.values()) else ""
+    notes = "; ".join(filter(None, (_grey(drawn), outlined)))
+    title = f"{name}: deflection lost on the way to the surface" + (f" ({notes})" if notes else "")
+    lines = [title, *_without_loss(maps)]
+    letters = int(_LETTERS_per_inch * figure.get_size_inches()[0])
+    said = [part for line in lines for part in textwrap.wrap(line, letters)]
+    figure.suptitle("\n".join(said), fontsize=12 if len(said) == 1 else 10)
     return figure
+
+
+def _loses(loss_map: LossMap) -> bool:
+    """Tell whether anything is lost or gained anywhere in a map."""
+    there = loss_map.loss[np.isfinite(loss_map.loss)]
+    return bool(np.any(np.abs(there) > _NO_LOSS))
+
+
+def _without_loss(maps: Mapping[ControlName, Sequence[LossMap]]) -> list[str]:
+    """Return the sentences on maps that are not drawn: where nothing is lost, or nothing moves."""
+    found: dict[str, list[str]] = {}
+    for control, of_control in maps.items():
+        for loss_map in of_control:
+            if not _loses(loss_map):
+                moves = bool(np.isfinite(loss_map.loss).any())
+                why = "Nothing is lost" if moves else "The loader rests within its breakout"
+                found.setdefault(f"{why} on the {control}", []).append(loss_map.configuration)
+    alike: dict[tuple[str, tuple[str, ...]], list[str]] = {}
+    for place, configurations in found.items():
+        why, _, name = place.partition(" on the ")
+        alike.setdefault((why, tuple(configurations)), []).append(name)
+    return [
+        f"{why} on {_in_a_row(controls)}, {_in_a_row(configurations)}."
+        for (why, configurations), controls in alike.items()
+    ]
+
+
+def _in_a_row(words: Sequence[str]) -> str:
+    return " and ".join(filter(None, (", ".join(words[:-1]), words[-1])))
+
+
+def _draw_row(
+    figure: Figure, ours: Sequence[tuple[Axes, LossMap]], flown: Floats, system: System
+) -> None:
+    """Draw the maps of a control, in the same colours."""
+    pressure = pressure_shown(system)
+    factor, unit = scale(ours[0][1].control, system)
+    least, most = _range(ours, flown)
+    for axes, loss_map in ours:
+        axes.set_visible(True)
+        mesh = axes.pcolormesh(
+            pressure.factor * loss_map.pressure_Pa,
+            factor * loss_map.deflection,
+            100.0 * loss_map.loss.T,
+            cmap="RdBu_r" if least < 0.0 else "Reds",
+            vmin=least,
+            vmax=most,
+            shading="gouraud",
+        )
+        _outline(axes, flown, (pressure.factor, factor))
+        axes.set_facecolor(GRAY)  # no loss: the loader rests, or the grip does not go so far
+        axes.set_ylim(0.0, factor * loss_map.deflection[-1])
+        axes.set_title(f"{loss_map.control}, {loss_map.configuration}", fontsize=10)
+        axes.set_xlabel(f"dynamic pressure q̄, {pressure.unit}")
+    ours[0][0].set_ylabel(f"true deflection δ, {unit}")
+    beyond = "both" if least < 0.0 else "max"
+    bar = figure.colorbar(mesh, ax=[axes for axes, _ in ours], extend=beyond)
+    bar.set_label("loss, % of δ")
+
+
+def _range(ours: Sequence[tuple[Axes, LossMap]], flown: Floats) -> tuple[float, float]:
+    """Return the ends of a row's colours, in %: the losses where it was flown.
+
+    Those near neutral are beyond: there a breakout is a large share of a small deflection.
+    """
+    found = np.concatenate([_flown_losses(loss_map, flown) for _, loss_map in ours])
+    if not found.size:
+        found = np.concatenate([m.loss[np.isfinite(m.loss)] for _, m in ours])
+    low, high = 100.0 * float(np.min(found)), 100.0 * float(np.max(found))
+    most = max(1.0, high, -low)
+    return (-most if low < -_GAINS_percent else 0.0), most
+
+
+def _flown_losses(loss_map: LossMap, flown: Floats) -> Floats:
+    """Return the losses within the hull of what was flown, from a tenth of its deflection on.
+
+    Without flights, from a tenth of the travel on.
+    """
+    q, d = np.meshgrid(loss_map.pressure_Pa, loss_map.deflection, indexing="ij")
+    sizes = np.array([[loss_map.pressure_Pa[-1]], [loss_map.deflection[-1]]])
+    inside = np.ones(q.shape, dtype=bool)
+    greatest = float(np.max(flown[1], initial=0.0)) or float(loss_map.deflection[-1])
+    with contextlib.suppress(QhullError, ValueError):
+        places = np.stack((q.ravel(), d.ravel()), axis=1) / sizes.T
+        inside = Delaunay((flown / sizes).T).find_simplex(places).reshape(q.shape) >= 0
+    inside &= (d >= _NEUTRAL * greatest) & np.isfinite(loss_map.loss)
+    return np.asarray(loss_map.loss[inside])
 
 
 def _grey(maps: Mapping[ControlName, Sequence[LossMap]]) -> str:
@@ -74,11 +162,6 @@ def _grey(maps: Mapping[ControlName, Sequence[LossMap]]) -> str:
     where = ["within the breakout"] if any(rests) else []
     where += ["beyond where the grip can go"] if any(held) else []
     return f"grey: {' and '.join(where)}" if where else ""
-
-
-def _pressure(system: System) -> Shown:
-    """Return what q̄ is drawn in."""
-    return Shown("kPa", 1e-3) if system == "si" else in_system("Pa", system)
 
 
 def _outline(axes: Axes, flown: Floats, factors: tuple[float, float]) -> None:
@@ -95,7 +178,7 @@ def _outline(axes: Axes, flown: Floats, factors: tuple[float, float]) -> None:
 def draw_feel(name: str, feel: Feel, system: System = "si") -> Figure:
     """Draw the column's force per g and per knot against q̄."""
     figure, grid = panels(1, 2, 3.6)
-    pressure, force = _pressure(system), in_system("N", system)
+    pressure, force = pressure_shown(system), in_system("N", system)
     rows = (
         (f"force per g, {force.unit}", feel.per_g_N),
         (f"pull per knot slower, {force.unit}", feel.per_knot_N),

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from matplotlib.figure import Figure
 
-from coupled.display import System, in_system
+from coupled.display import System, in_system, pressure_in
 from coupled.record.channels import unit_of
 from coupled.units import DEGREE_rad
 
@@ -49,9 +49,9 @@ def case_panels(rows: int, cases: int, height: float) -> tuple[Figure, Any]:
     return figure, grid.T
 
 
-def pressure(pressure_Pa: float) -> str:
+def pressure(pressure_Pa: float, system: System = "si") -> str:
     """Return a dynamic pressure as a title has it."""
-    return f"q̄ = {pressure_Pa / 1000.0:.2f} kPa"
+    return f"q̄ = {pressure_in(pressure_Pa, system)}"
 
 
 def title(found: Documentation, what: str) -> str:

@@ -23,6 +23,7 @@ from coupled.files import write_whole
 
 _NOTED = 10  # font size of a title with a note
 _LETTERS_per_inch = 10.0  # of a note
+_DOTS_per_inch = 130
 FORMATS = (".png", ".pdf", ".svg")
 BOX = "□"  # in place of a letter that no font has
 # Fonts with the letters of languages that matplotlib's own font lacks, of the common systems.
@@ -100,7 +101,7 @@ def with_note(figure: Figure, note: str) -> Figure:
 def save(figure: Figure, path: Path, note: str = "") -> None:
     """Write a figure, whole; the same figure gives the same bytes on the same machine.
 
-    The `note` is a line below its title.
+    The `note` is a line below its title. Letters of a PDF stay text.
     """
     check_format(path)
     with_note(figure, note)
@@ -108,10 +109,12 @@ def save(figure: Figure, path: Path, note: str = "") -> None:
     FigureCanvasAgg(figure)
     kind = path.suffix.lower()[1:]
     no_date: dict[str, Any] = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}.get(kind, {})
-    with rc_context({"svg.hashsalt": "coupled"}):
+    with rc_context({"svg.hashsalt": "coupled", "pdf.fonttype": 42}):
         # Into memory first: matplotlib raises what it likes where a disk is full.
         drawn = BytesIO()
-        figure.savefig(drawn, dpi=130, format=kind, metadata=no_date)
+        figure.savefig(
+            drawn, dpi=max(_DOTS_per_inch, figure.get_dpi()), format=kind, metadata=no_date
+        )
     write_whole(path, lambda part: part.write_bytes(drawn.getvalue()))
 
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from coupled.display import System, in_system
 from coupled.gap.noise.smooth import rate_of, smoothed
 from coupled.gap.signals.air import vertical_air
 from coupled.gap.signals.output import Floats, Output
@@ -191,6 +192,19 @@ class Signal:
         """Return the label with its unit on a control."""
         small, large, tiny = ("mm", "m", "µm") if unit_of(control) == "m" else ("°", "°", "0.001°")
         return f"{self.label}, {self.unit.format(d=small, D=large, u=tiny)}"
+
+    def shown_in(self, control: str, system: System) -> Signal:
+        """Return the signal in the units of a system; as it is in SI."""
+        if system == "si":
+            return self
+        length, angle = unit_of(control) == "m", "°"
+        whole = self.unit.format(d="m", D="m", u="m") if length else self.unit
+        unit = in_system(whole, system)
+        factor = unit.factor
+        if length:
+            factor *= 1e-3 if "{d}" in self.unit else 1e-6 if "{u}" in self.unit else 1.0
+        written = unit.unit.replace("{d}", angle).replace("{D}", angle).replace("{u}", "0.001°")
+        return Signal(self.label, written, lambda scene, rig: factor * self.get(scene, rig))
 
 
 def _other_force(scene: Scene) -> Floats:

@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from coupled.display import System
 from coupled.gap.chain import BY_NAME as STAGE_OF
 from coupled.gap.effects.effect import Effect, Signature, touched
 from coupled.gap.effects.library import WHOLE_s
-from coupled.gap.findings.summary import change, plain
+from coupled.gap.findings.summary import change, in_units, plain
 from coupled.gap.signals.output import Floats, Output
 from coupled.plots import gapview as look
 from coupled.plots.gapview import View, channel_label, style_of, unit_shown
@@ -63,7 +64,7 @@ def _draw_effect(figure: Any, view: View, effect: Effect) -> None:
     models = _models(view, effect, base)
     left, right = figure.subplots(1, 2, width_ratios=[1.0, 1.15])
     try:
-        _draw_law(left, Scene(reader, ours), effect.signature, models)
+        _draw_law(left, Scene(reader, ours), effect.signature, models, view.system)
     except KeyError as lacking:
         left.set_axis_off()
         left.text(0.5, 0.5, f"the record lacks {lacking.args[0]}", ha="center", fontsize=9)
@@ -79,7 +80,7 @@ def _draw_effect(figure: Any, view: View, effect: Effect) -> None:
 def _title(view: View, effect: Effect) -> str:
     """Return the effect with its parameters."""
     found = next(e for e in view.diagnosis.effects if e.name == effect.name)
-    numbers = [change(p) for p in found.parameters]
+    numbers = [change(in_units(p, view.system)) for p in found.parameters]
     return ", ".join([f"{effect.stage}: {plain(effect.name)}", *numbers])
 
 
@@ -94,9 +95,11 @@ def _models(view: View, effect: Effect, base: Rig) -> list[_Model]:
     return models
 
 
-def _draw_law(axes: Any, scene: Scene, signature: Signature, models: Sequence[_Model]) -> None:
+def _draw_law(
+    axes: Any, scene: Scene, signature: Signature, models: Sequence[_Model], system: System
+) -> None:
     """Draw the effect's law: what was measured as dots, the rigs as lines."""
-    control, y = scene.reader.control, SIGNALS[signature.y]
+    control, y = scene.reader.control, SIGNALS[signature.y].shown_in(scene.reader.control, system)
     axes.set_ylabel(y.label_on(control), fontsize=9)
     if signature.drawing == "time":
         time = scene.reader.record.time_s
@@ -105,7 +108,7 @@ def _draw_law(axes: Any, scene: Scene, signature: Signature, models: Sequence[_M
         axes.set_xlabel("time, s", fontsize=9)
         axes.set_title("from kinematics", fontsize=9, loc="left")
         return
-    x = SIGNALS[signature.x]
+    x = SIGNALS[signature.x].shown_in(control, system)
     axes.set_xlabel(x.label_on(control), fontsize=9)
     inner = slice(_EDGE, -_EDGE)
     at, seen = x.get(scene, None)[inner], y.get(scene, None)[inner]
@@ -164,7 +167,7 @@ def _draw_zoom(
     axes: Any, view: View, output: Output, models: Sequence[_Model], length_s: float
 ) -> None:
     """Draw measured and predicted over time, where they differ most; the input beneath."""
-    factor, unit = unit_shown(output.channel)
+    factor, unit = unit_shown(output.channel, view.system)
     made = [(model, factor * output.predict(model.rig)) for model in models]
     rows = _widest_window(made[1][1] - made[0][1], round(length_s * output.frame_rate_Hz))
     time = view.time(output)[rows]

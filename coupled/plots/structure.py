@@ -22,7 +22,7 @@ def draw_structure(figure: Any, view: View) -> None:
     """Draw what is left of the widest residual against each signal, and its spectrum."""
     improved = view.diagnosis.improved
     output = max(view.suspects(), key=lambda o: o.gap(improved))
-    scale, unit = residual_shown(output.channel)
+    scale, unit = residual_shown(output.channel, view.system)
     left = scale * output.floor * output.residual(improved)
     line = _spectrum(left, output.frame_rate_Hz)
     panels = [(_share(signal, left), label, signal) for label, signal in _signals(view, output)]
@@ -61,11 +61,11 @@ def _signals(view: View, output: Output) -> list[tuple[str, Floats]]:
     found: list[tuple[str, Floats]] = []
     for name in (f"{control}_force_N", f"{control}_computed_{d}", "dynamic_pressure_Pa"):
         if name in record:
-            factor, unit = unit_shown(name)
+            factor, unit = unit_shown(name, view.system)
             found.append((f"{channel_label(name)}, {unit}", factor * record[name]))
     computed = f"{control}_computed_{d}"
     if computed in record:
-        factor, unit = unit_shown(computed)
+        factor, unit = unit_shown(computed, view.system)
         speed = factor * rate_of(smoothed(record[computed]), output.frame_rate_Hz)
         found.append((f"deflection's rate δc′, {unit}/s", speed))
     return [*found, ("time, s", view.time(output))]

@@ -12,6 +12,7 @@ import polars as pl
 from numpy.typing import NDArray
 
 from coupled.display import System, parameter_label, shown
+from coupled.errors import listed
 from coupled.plots.histories import plain
 
 Floats = NDArray[np.float64]
@@ -19,6 +20,7 @@ MOST_ROWS = 4
 _LETTERS_PER_INCH = 12.0  # of a title in 11 points, at the least
 _STILL = 1e-9  # what a figure spreads by where it does not vary: the arithmetic's own
 _EVEN = 1e-3  # of a step, by which steps differ that are taken as even
+_ONE_LINE = 0.01  # of a figure's span, within which lines are one to the eye
 _WIDE = 10.0  # greatest over least value of an axis that may be logarithmic
 WORDS = {
     "asked_norm": "surface asked",
@@ -81,6 +83,32 @@ def varying(
         return list(figures)[:1], ""
     remark = "the same in every flight: " + "; ".join(still) if still else ""
     return drawn[:MOST_ROWS], remark
+
+
+def coincident(found: pl.DataFrame, keys: Sequence[str], figures: Sequence[str]) -> list[str]:
+    """Return which configurations have the same line of a figure, a sentence a figure."""
+    said = []
+    for name in figures:
+        values = found[name].drop_nulls().cast(pl.Float64).to_numpy()
+        span = float(np.ptp(values)) if values.size else 0.0
+        groups: list[tuple[list[str], Floats]] = []
+        for configuration in found["configuration"].unique(maintain_order=True):
+            rows = found.filter(pl.col("configuration") == configuration).sort(*keys)
+            line = rows[name].cast(pl.Float64).fill_null(np.nan).to_numpy()
+            for names, other in groups:
+                alike = line.shape == other.shape
+                if alike and np.allclose(line, other, 0.0, _ONE_LINE * span, equal_nan=True):
+                    names.append(configuration)
+                    break
+            else:
+                groups.append(([configuration], line))
+        word = WORDS.get(name, parameter_label(name))
+        said += [
+            f"{word[0].upper()}{word[1:]}: {listed(names[:-1])} and {names[-1]} coincide."
+            for names, _ in groups
+            if len(names) > 1
+        ]
+    return said
 
 
 def titled(title: str, remark: str, width_in: float) -> str:

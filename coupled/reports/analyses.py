@@ -82,9 +82,7 @@ def stability_report(found: Stability, made: Made) -> Report:
 
 def draw_planes(found: Stability) -> Figure:
     """Draw the maps over K·G_T."""
-    names = dict.fromkeys(one.control for one in found.planes)
-    planes = {name: [one for one in found.planes if one.control == name] for name in names}
-    return draw_stability(found.rig, planes)
+    return draw_stability(found.rig, found.by_control)
 
 
 def _limit(limit: Limit) -> tuple[Cell, ...]:

@@ -8,44 +8,45 @@ from itertools import groupby
 from coupled.campaign.check import CheckResult
 from coupled.campaign.verdict import Verdict as Judged
 from coupled.campaign.verdict import figures, finding, wanted
+from coupled.display import System
 from coupled.reports.page import Made, Mark, Report, Section, Table, Verdict, passed
 
 _HEADS = ("", "case", "expected of", "configuration", "found", "wanted", "margin")
 
 
-def check_report(checked: CheckResult, made: Made) -> Report:
-    """Return the report: a table a run; what fails is named in the verdict."""
+def check_report(checked: CheckResult, made: Made, system: System = "si") -> Report:
+    """Return the report: a table a run, in a system's units; the verdict names what fails."""
     runs = list(dict.fromkeys(verdict.run for verdict in checked.verdicts))
     groups = groupby(checked.verdicts, key=lambda v: v.run)
-    sections = [Section(run, (_table(list(group)),)) for run, group in groups]
+    sections = [Section(run, (_table(list(group), system),)) for run, group in groups]
     settings = (("runs", ", ".join(runs)),)
     title = ", ".join(runs) or "Expectations"
-    return Report("Check", title, _verdict(checked), tuple(sections), settings, made)
+    return Report("Check", title, _verdict(checked, system), tuple(sections), settings, made)
 
 
-def _verdict(checked: CheckResult) -> Verdict:
+def _verdict(checked: CheckResult, system: System) -> Verdict:
     failed = [verdict for verdict in checked.verdicts if not verdict.passed]
     said = f"{checked.total - len(failed)} of {checked.total} expectations hold."
-    remarks = [_remark(verdict) for verdict in failed]
+    remarks = [_remark(verdict, system) for verdict in failed]
     return Verdict(said, "bad" if failed else "good", tuple(remarks))
 
 
-def _remark(verdict: Judged) -> str:
+def _remark(verdict: Judged, system: System) -> str:
     where = f"{verdict.run}, {verdict.case}: {verdict.what} [{verdict.configuration}]"
     at = "" if verdict.at_s is None else f", at {verdict.at_s:.4g} s"
     why = f". Why: {verdict.why}" if verdict.why else ""
-    return f"{where}: {finding(verdict)}{at}{why}"
+    return f"{where}: {finding(verdict, system)}{at}{why}"
 
 
-def _table(verdicts: Sequence[Judged]) -> Table:
-    return Table(_HEADS, tuple(_row(verdict) for verdict in verdicts), words=4)
+def _table(verdicts: Sequence[Judged], system: System) -> Table:
+    return Table(_HEADS, tuple(_row(verdict, system) for verdict in verdicts), words=4)
 
 
-def _row(verdict: Judged) -> tuple[str | Mark, ...]:
+def _row(verdict: Judged, system: System) -> tuple[str | Mark, ...]:
     mark = passed(verdict.passed)
     if verdict.value is None or verdict.margin is None:
         what = f"{verdict.what}: {verdict.problem}"
-        return mark, verdict.case, what, verdict.configuration, "–", wanted(verdict), "–"
-    found, margin = figures(verdict)
-    numbers = (found, wanted(verdict), margin)
+        return mark, verdict.case, what, verdict.configuration, "–", wanted(verdict, system), "–"
+    found, margin = figures(verdict, system)
+    numbers = (found, wanted(verdict, system), margin)
     return mark, verdict.case, verdict.what, verdict.configuration, *numbers

@@ -4,13 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from coupled.display import percent
+from coupled.display import System, percent
 from coupled.gap.findings.budget import share_of
 from coupled.gap.findings.diagnosis import Diagnosis
 from coupled.gap.findings.power import EffectPower
 from coupled.gap.findings.result import EffectResult, ParameterEstimate, StageResult
 from coupled.gap.findings.shrink import ChannelShrink
-from coupled.gap.findings.summary import figure, in_figures, plain, sentences
+from coupled.gap.findings.summary import (
+    figure,
+    in_units,
+    plain,
+    sentences,
+    size_in,
+    summary_in,
+)
 from coupled.plots.gaps import draw_diagnosis
 from coupled.plots.gapview import channel_label, unit_shown
 from coupled.plots.saving import svg_text
@@ -24,46 +31,50 @@ _CAPTIONS = {
 }
 
 
-def diagnosis_report(whole: Diagnosis, title: str, made: Made, with_power: bool = False) -> Report:
+def diagnosis_report(
+    whole: Diagnosis, title: str, made: Made, with_power: bool = False, system: System = "si"
+) -> Report:
     """Return the report; with the least sizes that would have shown, where they are asked for."""
-    tables = [_effects(whole), _stages(whole), _shrink(whole), _again(whole), _in_flight(whole)]
+    tables = [_effects(whole, system), _stages(whole), _shrink(whole, system)]
+    tables += [_again(whole, system), _in_flight(whole, system)]
     tables.append(_next(whole))
     if with_power:
-        tables.append(_power(whole))
+        tables.append(_power(whole, system))
     sections = [Section(head, (table,)) for head, table in filter(None, tables)]
-    figures = (
-        Drawing(svg_text(drawn), _CAPTIONS[name]) for name, drawn in draw_diagnosis(whole).items()
-    )
+    drawn = draw_diagnosis(whole, system)
+    figures = (Drawing(svg_text(each), _CAPTIONS[name]) for name, each in drawn.items())
     sections.append(Section("Figures", tuple(figures)))
     settings = (
         ("rig", whole.nominal.name),
         ("control", whole.control),
         ("records", f"{len(whole.records)}, {_seconds(whole):.4g} s in all"),
     )
-    return Report("Diagnosis", title, _verdict(whole), tuple(sections), settings, made)
+    return Report("Diagnosis", title, _verdict(whole, system), tuple(sections), settings, made)
 
 
 def _seconds(whole: Diagnosis) -> float:
     return sum(float(record.time_s[-1] - record.time_s[0]) for record in whole.records.values())
 
 
-def _verdict(whole: Diagnosis) -> Verdict:
-    first, *rest = sentences(whole.summary)
+def _verdict(whole: Diagnosis, system: System) -> Verdict:
+    first, *rest = sentences(summary_in(whole.summary, whole.effects, system))
     return Verdict(first, _TONES.get(whole.verdict, "plain"), tuple(rest))
 
 
-def _effects(whole: Diagnosis) -> tuple[str, Table] | None:
+def _effects(whole: Diagnosis, system: System) -> tuple[str, Table] | None:
     if not whole.effects:
         return None
     heads = ("effect", "stage", "rig file's key", "unit", "filed", "found", "95 % interval")
-    rows = [row for effect in whole.effects for row in _effect_rows(effect, whole)]
+    rows = [row for effect in whole.effects for row in _effect_rows(effect, whole, system)]
     return "Effects found", Table((*heads, "share", "probability"), tuple(rows), words=4)
 
 
-def _effect_rows(effect: EffectResult, whole: Diagnosis) -> Iterator[tuple[str, ...]]:
+def _effect_rows(
+    effect: EffectResult, whole: Diagnosis, system: System
+) -> Iterator[tuple[str, ...]]:
     """Yield a row a parameter; the effect's own share and probability are on the first."""
     sure = (share_of(whole.budget, effect.stage, effect.name), f"{effect.probability:.2f}")
-    for i, p in enumerate(effect.parameters):
+    for i, p in enumerate(in_units(each, system) for each in effect.parameters):
         names = ("", "") if i else (plain(effect.name), effect.stage)
         yield (*names, p.key, p.unit, *_numbers(p), *(("", "") if i else sure))
     if not effect.parameters:
@@ -91,17 +102,17 @@ def _stage_row(stage: StageResult) -> tuple[str | Mark, ...]:
     return stage.name, word, *("" if n is None else f"{n:.2f}" for n in numbers)
 
 
-def _shrink(whole: Diagnosis) -> tuple[str, Table] | None:
+def _shrink(whole: Diagnosis, system: System) -> tuple[str, Table] | None:
     if not whole.effects:
         return None
     heads = ("channel", "unit", "rms as filed", "with the effects", "noise", "closed")
-    rows = tuple(_shrink_row(one) for one in whole.shrink.channels)
+    rows = tuple(_shrink_row(one, system) for one in whole.shrink.channels)
     caption = "The rms residual on stretches of the record that the fit has not seen"
     return "How far the gap shrinks", Table((*heads, "95 % interval"), rows, caption, words=2)
 
 
-def _shrink_row(one: ChannelShrink) -> tuple[str, ...]:
-    factor, unit = unit_shown(one.channel)
+def _shrink_row(one: ChannelShrink, system: System) -> tuple[str, ...]:
+    factor, unit = unit_shown(one.channel, system)
     numbers = (f"{factor * n:.3g}" for n in (one.before, one.after, one.floor))
     cells = (channel_label(one.channel), unit, *numbers)
     if one.closed is None or one.low is None or one.high is None:
@@ -111,26 +122,26 @@ def _shrink_row(one: ChannelShrink) -> tuple[str, ...]:
     return *cells, f"{100 * one.closed:.0f} %", ends
 
 
-def _again(whole: Diagnosis) -> tuple[str, Table] | None:
+def _again(whole: Diagnosis, system: System) -> tuple[str, Table] | None:
     if whole.closed_loop is None:
         return None
     rows = []
     for one in whole.closed_loop:
-        factor, unit = unit_shown(one.channel)
+        factor, unit = unit_shown(one.channel, system)
         numbers = (f"{factor * n:.3g}" for n in (one.before, one.after))
         rows.append((channel_label(one.channel), unit, *numbers))
     heads = ("rms distance from the record", "unit", "rig as filed", "improved rig")
     return "Flown again with the record's pilot", Table(heads, tuple(rows), words=2)
 
 
-def _in_flight(whole: Diagnosis) -> tuple[str, Table] | None:
+def _in_flight(whole: Diagnosis, system: System) -> tuple[str, Table] | None:
     if whole.in_flight is None:
         return None
     rows = []
     for one in whole.in_flight:
         share = percent(one.share, 0)
         for i, (name, value) in enumerate(one.changes.items()):
-            factor, unit = unit_shown(name)
+            factor, unit = unit_shown(name, system)
             own = f"{100 * one.of_motion[name]:.3g} %"
             first = ("", "") if i else (plain(one.name), share)
             rows.append((*first, channel_label(name), unit, f"{factor * value:.3g}", own))
@@ -149,16 +160,16 @@ def _next(whole: Diagnosis) -> tuple[str, Table] | None:
     return "What to record next", Table(("test", "distinguishes", "log-likelihood"), rows, words=2)
 
 
-def _power(whole: Diagnosis) -> tuple[str, Table]:
-    rows = tuple((plain(one.name), one.stage, _least(one)) for one in whole.power)
+def _power(whole: Diagnosis, system: System) -> tuple[str, Table]:
+    rows = tuple((plain(one.name), one.stage, _least(one, system)) for one in whole.power)
     head = "What these records would have shown"
     return head, Table(("effect", "stage", "from a size of"), rows, words=3)
 
 
-def _least(one: EffectPower) -> str:
+def _least(one: EffectPower, system: System) -> str:
     if not one.judged:
         return "its stage is not judged"
     if not one.shows:
         return "no size that it may have"
-    sizes = (f"{name} {in_figures(name, value)}" for name, value in one.parameters)
+    sizes = (size_in(name, value, system) for name, value in one.parameters)
     return ", ".join(sizes) or "it would show"

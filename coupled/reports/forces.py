@@ -7,9 +7,10 @@ from dataclasses import replace
 
 from coupled.calibration.checks import ControlCheck
 from coupled.calibration.documentation import Documentation
-from coupled.calibration.qualification import FeelTest, Issue, cover_rows, feel_tests, written
+from coupled.calibration.qualification import FeelTest, Issue, check_numbers, cover_rows, feel_tests
 from coupled.calibration.reasons import reasons
 from coupled.calibration.result import CalibrationResult
+from coupled.display import System, pressure_in, pressure_shown
 from coupled.plots.checks import draw_releases, draw_static_checks
 from coupled.plots.documentation import draw_deflections, draw_forces
 from coupled.plots.readings import draw_readings
@@ -36,91 +37,114 @@ Fits = Mapping[ControlName, tuple[CalibrationResult, str] | None]
 
 
 def force_report(
-    documents: Sequence[Documentation], fits: Fits, issue: Issue, made: Made
+    documents: Sequence[Documentation],
+    fits: Fits,
+    issue: Issue,
+    made: Made,
+    system: System = "si",
 ) -> Report:
-    """Return the force document of a rig's controls."""
-    tests = [(found, test) for found in documents for test in feel_tests(found, issue.reference)]
-    sections = [Section("Checks", (_checks([test for _, test in tests]),), own_page=True)]
-    sections += [_test(found, test) for found, test in tests]
-    sections += [_beside(found, fits.get(found.control)) for found in documents]
+    """Return the force document of a rig's controls, in the units of a system."""
+    tests = [
+        (found, test) for found in documents for test in feel_tests(found, issue.reference, system)
+    ]
+    sections = [Section("Checks", (_checks([test for _, test in tests], system),), own_page=True)]
+    sections += [_test(found, test, system) for found, test in tests]
+    sections += [_beside(found, fits.get(found.control), system) for found in documents]
     rig = documents[0].rig
     cover = Cover(cover_rows(documents, issue, __version__), _SIGNED)
     settings = (("rig", rig.name), ("frame rate", f"{rig.frame_rate:g} Hz"))
     why = [
-        f"{d.control}: {each}" for d in documents for each in reasons(d.rig, d.control, d.checks)
+        f"{d.control}: {each}"
+        for d in documents
+        for each in reasons(d.rig, d.control, d.checks, system)
     ]
-    verdict = _verdict([test for _, test in tests])
+    verdict = _verdict([test for _, test in tests], system)
     verdict = replace(verdict, remarks=(*verdict.remarks, *why))
     return Report("Force documentation", rig.name, verdict, tuple(sections), settings, made, cover)
 
 
-def force_summary(documents: Sequence[Documentation], issue: Issue, made: Made) -> Report:
+def force_summary(
+    documents: Sequence[Documentation], issue: Issue, made: Made, system: System = "si"
+) -> Report:
     """Return the table of checks alone."""
-    tests = [test for found in documents for test in feel_tests(found, issue.reference)]
+    tests = [test for found in documents for test in feel_tests(found, issue.reference, system)]
     rig = documents[0].rig
-    sections = (Section("Checks", (_checks(tests),)),)
-    return Report("Force documentation", rig.name, _verdict(tests), sections, (), made)
+    sections = (Section("Checks", (_checks(tests, system),)),)
+    return Report("Force documentation", rig.name, _verdict(tests, system), sections, (), made)
 
 
-def _verdict(tests: Sequence[FeelTest]) -> Verdict:
+def _verdict(tests: Sequence[FeelTest], system: System) -> Verdict:
     checks = [(test, check) for test in tests for check in test.checks]
     failed = [(test, check) for test, check in checks if not check.passed]
     said = f"{len(checks) - len(failed)} of {len(checks)} checks are within their tolerance."
     remarks = [
-        f"{test.number}, {test.title}, q̄ = {check.pressure_Pa / 1000:.2f} kPa: {check.name} is"
-        f" {written(check.measured)} {check.unit}, the reference {written(check.reference)} ±"
-        f" {written(check.tolerance)}."
+        f"{test.number}, {test.title}, q̄ = {pressure_in(check.pressure_Pa, system)}: {check.name}"
+        f" is {measured} {unit}, the reference {reference} ± {allowed}."
         for test, check in failed[:_NAMED]
+        for measured, reference, allowed, unit in [check_numbers(check, system)]
     ]
     if len(failed) > _NAMED:
         remarks.append(f"{len(failed) - _NAMED} more fail; the table of checks has all.")
     return Verdict(said, "bad" if failed else "good", tuple(remarks))
 
 
-def _checks(tests: Sequence[FeelTest]) -> Table:
+def _checks(tests: Sequence[FeelTest], system: System) -> Table:
     """Return the table of all checks, each with its test and the number of its figure."""
-    heads = ("test", "control", "check", "q̄, kPa", *_RESULTS[1:], "figure")
+    heads = (
+        "test",
+        "control",
+        "check",
+        f"q̄, {pressure_shown(system).unit}",
+        *_RESULTS[1:],
+        "figure",
+    )
     rows: list[tuple[str | Mark, ...]] = []
     for number, test in enumerate(tests, 1):
         for check in test.checks:
-            name, *result = _result(check)
-            pressure = f"{check.pressure_Pa / 1000:.2f}"
+            name, *result = _result(check, system)
+            pressure = pressure_in(check.pressure_Pa, system).partition(" ")[0]
             rows.append((test.number, test.control, name, pressure, *result, str(number)))
     return Table(heads, tuple(rows), words=3)
 
 
-def _result(check: ControlCheck) -> tuple[str | Mark, ...]:
-    numbers = (written(n) for n in (check.measured, check.reference, check.tolerance))
+def _result(check: ControlCheck, system: System) -> tuple[str | Mark, ...]:
     margin = f"{100 * check.margin:.0f} %"
-    return check.name, *numbers, check.unit, margin, passed(check.passed)
+    return check.name, *check_numbers(check, system), margin, passed(check.passed)
 
 
-def _test(found: Documentation, test: FeelTest) -> Section:
+def _test(found: Documentation, test: FeelTest, system: System) -> Section:
     """Return a test's own page: conditions, tolerances, results, figure."""
     alone = replace(found, conditions=(test.condition,))
     draw = draw_static_checks if test.kind == "static" else draw_releases
-    caption = f"{test.number}: {test.title}, q̄ = {test.condition.pressure_Pa / 1000:.2f} kPa."
-    results = Table(_RESULTS, tuple(_result(check) for check in test.checks))
+    place = pressure_in(test.condition.pressure_Pa, system)
+    caption = f"{test.number}: {test.title}, q̄ = {place}."
+    results = Table(_RESULTS, tuple(_result(check, system) for check in test.checks))
     blocks = (
         Table(("conditions", ""), test.conditions, words=2),
         Table(("tolerances", ""), test.tolerances, words=2),
         results,
-        Drawing(svg_text(draw(alone)), caption),
+        Drawing(svg_text(draw(alone, system)), caption),
     )
     return Section(f"{test.number}: {test.title}", blocks, own_page=True)
 
 
-def _beside(found: Documentation, fit: tuple[CalibrationResult, str] | None) -> Section:
+def _beside(
+    found: Documentation, fit: tuple[CalibrationResult, str] | None, system: System
+) -> Section:
     """Return what documents a control beside its tests."""
-    return Section(f"{found.control}, beside the tests", tuple(_drawn(found, fit)), own_page=True)
+    return Section(
+        f"{found.control}, beside the tests", tuple(_drawn(found, fit, system)), own_page=True
+    )
 
 
-def _drawn(found: Documentation, fit: tuple[CalibrationResult, str] | None) -> Iterator[Block]:
+def _drawn(
+    found: Documentation, fit: tuple[CalibrationResult, str] | None, system: System
+) -> Iterator[Block]:
     name = found.control
     forces = "Force against true deflection, swept both ways, with and without compensation."
-    yield Drawing(svg_text(draw_forces(found)), f"{name}: {forces}")
+    yield Drawing(svg_text(draw_forces(found, system)), f"{name}: {forces}")
     computed = "Computed against true deflection, and what the host's estimate lacks."
-    yield Drawing(svg_text(draw_deflections(found)), f"{name}: {computed}")
+    yield Drawing(svg_text(draw_deflections(found, system)), f"{name}: {computed}")
     if fit is not None:
         shown = f"Readings and fit (the report's figure 4), from {fit[1]}."
-        yield Drawing(svg_text(draw_readings(*fit)), f"{name}: {shown}")
+        yield Drawing(svg_text(draw_readings(*fit, system)), f"{name}: {shown}")

@@ -48,7 +48,7 @@ def flight_report(flight: Flight, made: Made) -> Report:
     history = Drawing(svg_text(draw_flight(flight)), _HISTORY)
     sections = (Section("Figures", (table,)), Section("Time histories", (history,)))
     loss, run = flight.outcome.loss, flight.manoeuvre
-    said = "The surface is not asked for anything."
+    said = "No share of authority is computed: the flight has no held command."
     if np.isfinite(loss):
         said = f"Authority lost: {percent(loss)}; felt of the specified gradient:"
         said += f" {flight.outcome.felt_ratio:.3f}."

@@ -47,7 +47,7 @@ def guess_note(
             said.setdefault(_in_a_row(names), []).append(name)
     if not said:
         return ""
-    each = (f"{names} of the {' and '.join(which)}" for names, which in said.items())
+    each = (f"{names} of the {_in_a_row(which)}" for names, which in said.items())
     return f"Guesses, not measurements: {'; '.join(each)}."
 
 

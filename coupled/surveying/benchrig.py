@@ -25,7 +25,7 @@ _YES, _NO = ("yes", "y", "true"), ("no", "n", "false")
 
 @dataclass(frozen=True)
 class Question:
-    """What is asked of a control: its name, its words, its unit in SI, and its rig's field."""
+    """A question on a control: its name, its words, its SI unit, and the field of the rig."""
 
     name: str
     words: str
@@ -34,7 +34,7 @@ class Question:
 
 
 def questions(control: ControlName) -> dict[str, Question]:
-    """Return what is asked of a control, by name, in the order in which it is asked."""
+    """Return the questions on a control, by name, in their order."""
     d = unit_of(control)
     mass = "kg" if d == "m" else "N·s²/rad"
     asked = (

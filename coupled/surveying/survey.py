@@ -17,7 +17,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from coupled.errors import InputError
+from coupled.errors import InputError, nearest
 from coupled.files import read_bytes
 from coupled.flight.aircraft import make_aircraft
 from coupled.flight.airframe import packaged_models
@@ -85,6 +85,19 @@ def known_models() -> dict[str, Path]:
     own = aircraft_folder()
     ours = {f.name: own for f in own.iterdir() if (f / f"{f.name}.xml").is_file()}
     return dict(sorted({**packaged_models(), **ours}.items(), key=lambda one: one[0].lower()))
+
+
+def chosen_models(names: Sequence[str], asked_by: str = "coupled.surveying") -> dict[str, Path]:
+    """Return some models, or all that are here, as `known_models` does.
+
+    Raises InputError, `asked_by` in the place of a file, for a model that is not here.
+    """
+    known = known_models()
+    for name in names:
+        if name not in known:
+            problem = f"there is no JSBSim model {name!r}; {nearest(name, known)}"
+            raise InputError(asked_by, "", problem)
+    return {name: known[name] for name in names or known}
 
 
 def rigs_by_model() -> dict[str, list[str]]:

@@ -6,10 +6,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, overload
 
-from coupled.errors import InputError, nearest
 from coupled.parallel import as_done, cores, executor
 from coupled.results import Displayed, Tabular, frame_of
-from coupled.surveying.survey import Surveyed, known_models, survey
+from coupled.surveying.survey import Surveyed, chosen_models, survey
 
 if TYPE_CHECKING:
     import polars as pl
@@ -55,17 +54,12 @@ def survey_models(
 
     `workers` are processes, 0 for one a core. Raises InputError for a model that is not here.
     """
-    known = known_models()
-    for name in names:
-        if name not in known:
-            problem = f"there is no JSBSim model {name!r}; {nearest(name, known)}"
-            raise InputError("coupled.surveying", "names", problem)
-    chosen = list(names or known)
+    chosen = chosen_models(names)
     found: dict[str, Surveyed] = {}
     # A survey keeps a core busy, and each process holds a model: more than the cores only cost.
     count = 1 if len(chosen) < 4 else min(cores(workers), cores(0), len(chosen))
     with executor(count) as pool:
-        for one in as_done(pool, survey, [(name, known[name]) for name in chosen], 2 * count):
+        for one in as_done(pool, survey, list(chosen.items()), 2 * count):
             found[one.model] = one
             if progress is not None:
                 progress(one.model, len(found), len(chosen))

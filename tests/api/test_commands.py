@@ -147,7 +147,7 @@ def test_the_document_is_the_commands(tmp_path: Path) -> None:
     stiff = {"controls.column.schedule.total_gradient_N_per_m": [400.0, 1600.0]}
     changed = coupled.document(coupled.load_rig("bench").changed(stiff), specified="bench")
     assert changed.issue.rig_file == "bench.toml, changed"
-    assert changed.issue.reference == "what bench specifies"
+    assert changed.issue.reference == "what bench.toml specifies"
 
 
 def test_calibration_goes_into_a_rig(tmp_path: Path) -> None:

@@ -60,16 +60,20 @@ def test_the_figure_explains_its_grey() -> None:
     """With no number at all, too: numpy's warnings are errors in these tests."""
     place = "controls.column.loader."
 
-    def said(changes: dict[str, float]) -> str:
+    def said(changes: dict[str, float]) -> list[str]:
         rig = bench({place + key: value for key, value in changes.items()})
         drawn = draw_losses("r", {"column": loss_maps(rig, "column")}, {"column": np.empty((2, 0))})
-        return drawn.get_suptitle().removeprefix("r: deflection lost on the way to the surface")
+        title = drawn.get_suptitle().removeprefix("r: deflection lost on the way to the surface")
+        return title.replace("\n(", " (").split("\n")
 
-    assert said({}) == ""
-    assert said({"breakout_N": 9.0}) == " (grey: within the breakout)"
-    assert said({"breakout_N": 3e4}) == " (grey: within the breakout)"
+    nothing = "Nothing is lost on column, deflection only and compensated."
+    rests = "The loader rests within its breakout on column"
+    assert said({}) == ["", nothing]
+    assert said({"breakout_N": 9.0}) == [" (grey: within the breakout)", nothing]
+    assert " ".join(said({"breakout_N": 3e4})).strip().startswith(f"{rests}, uncompensated")
     rigid_stop = {"bend_m_per_N": 0.0, "stop_aft_m": 0.03}
-    assert said(rigid_stop) == " (grey: beyond where the grip can go)"
+    nothing = "Nothing is lost on column, uncompensated and gradient only."
+    assert said(rigid_stop) == [" (grey: beyond where the grip can go)", nothing]
 
 
 def felt(rig: Rig) -> Feel:

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
+from coupled.display import System
 from coupled.gap.diagnose import diagnose
 from coupled.gap.effects.effect import Effect, apply
 from coupled.gap.effects.library import BY_NAME, EFFECTS
@@ -23,7 +24,7 @@ from coupled.gap.stages.airframe import airframe_outputs
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points
 from coupled.plots.gaps import FIGURES, draw_diagnosis
-from coupled.plots.gapview import View, channel_label, unit_shown
+from coupled.plots.gapview import View, channel_label, residual_shown, unit_shown
 from coupled.plots.saving import save
 from coupled.plots.signals import SIGNALS
 from coupled.plots.signatures import draw_signature
@@ -32,6 +33,7 @@ from coupled.rig.rig import Rig
 from tests.support.commands import coupled
 from tests.support.gaps import made, nominal_rig
 
+SYSTEMS: tuple[System, System] = ("si", "us")
 Case = tuple[Rig, Record, tuple[Output, ...]]
 UNITS = r"%|%/s|1|°|°/s|g|N|N/m|m/s|m/s²|mm|mm/s|cm|cm/s|µm|kPa|kPa/s|s|Hz"
 UNIT = re.compile(rf", ({UNITS})( \(logarithmic\))?$")
@@ -182,6 +184,33 @@ def test_what_was_lost_on_the_way_is_drawn_without_it(cases: Mapping[bool, Case]
     assert outputs and nominal.flight is None
 
 
+def drawn_x(figure: Figure) -> float:
+    """Return how far the law's dots go along the bottom."""
+    return float(np.nanmax(np.abs(np.asarray(figure.axes[0].lines[0].get_xdata(), float))))
+
+
+def test_a_signature_is_drawn_in_us_units(cases: Mapping[bool, Case]) -> None:
+    effect = "backlash"
+    diagnosis = diagnosis_of(cases[needs_flight(BY_NAME[effect])], [BY_NAME[effect]])
+    si, us = (draw_signature(View(diagnosis, system)) for system in SYSTEMS)
+    assert labels(si)[0].endswith(", mm") and labels(us)[0].endswith(", in")
+    assert drawn_x(us) == pytest.approx(drawn_x(si) / 25.4)
+    assert not [label for label in labels(us) if re.search(r"\bN\b|\bmm\b|\bcm\b", label)]
+    names = [
+        label for figure in draw_diagnosis(diagnosis, "us").values() for label in labels(figure)
+    ]
+    assert not [label for label in names if re.search(r"\bN\b|\bmm\b|\bcm\b", label)]
+
+
+def test_us_units_of_channels() -> None:
+    assert unit_shown("column_gradient_N_per_m", "us")[1] == "lb/in"
+    factor, unit = unit_shown("column_deflection_m", "us")
+    assert (round(factor, 4), unit) == (39.3701, "in")
+    assert residual_shown("column_deflection_m", "us")[1] == "in"
+    assert residual_shown("column_deflection_m") == (1000.0, "mm")
+    assert unit_shown("load_factor", "us") == (1.0, "g")
+
+
 def test_channels_have_labels_and_units() -> None:
     assert channel_label("column_gradient_N_per_m") == "scheduled gradient G_T"
     assert unit_shown("column_gradient_N_per_m")[1] == "N/m"
@@ -194,9 +223,11 @@ def test_channels_have_labels_and_units() -> None:
 def test_plots_on_the_command_line(tmp_path: Path) -> None:
     nominal = nominal_rig(True)
     write_record(made(tmp_path, nominal, {}, 8).between(0.0, 12.0), tmp_path / "r.csv")
+    us = ("--units", "us", "--report", "us.html")
     asked = ("diagnose", "r.csv", "--rig", "report-column", "--plots")
-    done = coupled(tmp_path, *asked, "figures")
+    done = coupled(tmp_path, *asked, "figures", *us)
     assert done.returncode == 0, done.stderr
+    assert "Each stage of the chain" in (tmp_path / "us.html").read_text(encoding="utf-8")
     for name in FIGURES:
         assert f"figure: figures/{name}" in done.stdout
         assert (tmp_path / "figures" / name).read_bytes()[:4] == b"\x89PNG"

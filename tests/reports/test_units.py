@@ -10,14 +10,30 @@ import numpy as np
 import polars as pl
 import pytest
 
+from coupled.calibration.documentation import document
+from coupled.calibration.qualification import Issue, feel_tests
 from coupled.calibration.readingsfile import read_readings
+from coupled.campaign.check import CheckResult
+from coupled.campaign.verdict import Verdict
 from coupled.cli.tables.campaign import print_sweep
 from coupled.cli.terminal import SafeConsole
-from coupled.display import System
+from coupled.display import System, in_system
 from coupled.plots.campaign import draw_sweep
+from coupled.plots.checks import draw_static_checks
+from coupled.plots.documentation import draw_forces
 from coupled.plots.sweepview import WORDS, Shown
+from coupled.reports.check import check_report
+from coupled.reports.forces import force_summary
+from coupled.reports.made import made_by
+from coupled.reports.page import render
+from coupled.resources import shipped_rigs
+from coupled.rig.rigfile import read_rig
+from coupled.units import POUND_N
 from tests.support.commands import coupled
 from tests.support.runs import SHORT
+
+GRADIENT = "specified gradient G_T there"
+SYSTEMS: tuple[System, System] = ("si", "us")
 
 
 def text_of(file: Path) -> str:
@@ -93,3 +109,29 @@ def test_a_sweeps_table_and_figure_have_the_same_units(
         most = float(np.asarray(axes.get_lines()[0].get_ydata())[-1])
         assert f"{most:.3g}" in line
         assert Shown.of(name, system).factor * TABLE[name][1] == pytest.approx(most)
+
+
+def test_a_check_in_us_units_has_them_in_its_report() -> None:
+    verdict = Verdict("r", "a", "rigid", "largest force", 44.482, None, 40.0, quantity="force_N")
+    checked = CheckResult((verdict,))
+    for system, found in zip(SYSTEMS, ("44.48 N", "10 lb"), strict=True):
+        report = render(check_report(checked, made_by("c", []), system))
+        assert found in report.replace("\N{NO-BREAK SPACE}", " ")
+
+
+def test_a_force_document_in_us_units_has_them_in_figures_and_report() -> None:
+    data = read_rig(shipped_rigs()["bench"])
+    found = document(data, "column", None)
+    issue = Issue("bench.toml", "", "")
+    drawn = {}
+    for system, force, pressure in zip(SYSTEMS, ("N", "lb"), ("kPa", "lb/ft²"), strict=True):
+        report = render(force_summary([found], issue, made_by("c", []), system))
+        assert f"q̄, {pressure}" in report and f">{force}<" in report
+        drawn[system] = [draw_forces(found, system), draw_static_checks(found, system)]
+        for figure in drawn[system]:
+            assert figure.axes[0].get_ylabel() == f"force at the grip F, {force}"
+            assert pressure in figure.axes[0].get_title()
+        [test, *_] = feel_tests(found, "", system)
+        assert f" {in_system('N/m', system).unit}" in dict(test.conditions)[GRADIENT]
+    for si, us in zip(*drawn.values(), strict=True):
+        assert us.axes[0].get_ylim()[1] == pytest.approx(si.axes[0].get_ylim()[1] / POUND_N)

@@ -10,6 +10,7 @@ from coupled.authority.compare import compare
 from coupled.errors import InputError
 from coupled.flight.runfile import manoeuvres_from_table
 from coupled.plots.flights import draw_comparison
+from coupled.record.channels import unit_of
 from coupled.resources import shipped_rigs
 from coupled.rig.guesses import guess_note, without_guesses
 from coupled.rig.rig import Rig
@@ -52,6 +53,13 @@ def test_a_note_names_the_weightiest_guess_first(tmp_path: Path) -> None:
         == "Guesses, not measurements: mass of the column."
     )
     assert guess_note(rig.changed({"controls.column.guesses": []}).controls) == ""
+
+
+def test_a_note_of_three_controls_has_one_and() -> None:
+    rig = read_rig(shipped_rigs()["t37"])
+    keys = {f"controls.{name}.guesses": [f"travel_{unit_of(name)}"] for name in rig.controls}
+    note = guess_note(rig.changed(keys).controls)
+    assert note == "Guesses, not measurements: travel of the column, wheel and pedals."
 
 
 def test_a_guess_that_is_no_number_is_refused(tmp_path: Path) -> None:

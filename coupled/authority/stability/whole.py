@@ -56,6 +56,12 @@ class Stability(TableResult):
         """Whether no value of the rig's own lies where it is unstable."""
         return not any(limit.outside for control in self.limits for limit in control.limits)
 
+    @property
+    def by_control(self) -> dict[ControlName, list[Plane]]:
+        """The planes of each control."""
+        names = dict.fromkeys(one.control for one in self.planes)
+        return {name: [one for one in self.planes if one.control == name] for name in names}
+
     def __repr__(self) -> str:
         word = "stable as filed" if self.stable else "unstable as filed"
         names = ", ".join(control.control for control in self.limits)
@@ -92,25 +98,30 @@ class Stability(TableResult):
         )
 
 
-def map_stability(
-    rig: Rig, control: ControlName | None = None, progress: Progress | None = None
-) -> Stability:
-    """Return where a rig is stable, on one control or on all that bend.
+def bending(rig: Rig, control: str | None = None, asked_as: str = "control") -> list[ControlName]:
+    """Return the controls that bend, of one or of all.
 
-    Raises InputError where the rig lacks the control, or nothing bends.
+    Raises InputError, which names the control `asked_as`, where the rig lacks it, or none bends.
     """
     file = rig.file or Path(rig.name)
     names = [name for name in rig.controls if control in (None, name)]
     if not names:
         problem = f"no {control!r}; {nearest(str(control), rig.controls)}"
-        raise InputError(file, "control", problem)
+        raise InputError(file, asked_as, problem)
     bent = [name for name in names if rig.controls[name].loader.bend > 0.0]
     if not bent:
         key = f"controls.{names[0]}.loader.bend_{unit_of(names[0])}_per_N"
         raise InputError(file, key, "is 0 and nothing bends; a map over K·G_T needs a K above 0")
+    return bent
+
+
+def map_stability(
+    rig: Rig, bent: Sequence[ControlName], progress: Progress | None = None
+) -> Stability:
+    """Return where a rig is stable, on controls that bend."""
     asked = [(name, kind) for name in bent for kind in kinds_of(rig.controls[name])]
     limits = tuple(stability_limits(rig, name) for name in bent)
-    bob = bob_weight(rig, file) if "column" in bent else None
+    bob = bob_weight(rig, rig.file or Path(rig.name)) if "column" in bent else None
     return Stability(rig, limits, _planes(rig, asked, progress), bob)
 
 

@@ -18,7 +18,8 @@ from coupled.record.channels import unit_of
 if TYPE_CHECKING:
     from coupled.calibration.checks import ControlCheck
     from coupled.calibration.coverage import Coverage
-    from coupled.calibration.plan import DeflectionNeeds, Precision, Station
+    from coupled.calibration.plan import DeflectionNeeds
+    from coupled.calibration.planned import ReadingsPlan
     from coupled.calibration.result import CalibrationResult
 
 
@@ -38,17 +39,9 @@ def print_calibration(console: Console, found: CalibrationResult, system: System
         console.print(line, highlight=False, markup=False)
 
 
-def print_plan(
-    console: Console,
-    control: str,
-    grids: dict[tuple[int, int], Precision],
-    chosen: Sequence[tuple[Station, int]],
-    reached: Precision,
-    needs: DeflectionNeeds,
-    system: System = "si",
-) -> None:
+def print_plan(console: Console, plan: ReadingsPlan, system: System = "si") -> None:
     """Print how precise K gets by grids of readings, and the fewest that reach what is wanted."""
-    d = unit_of(control)
+    d, grids, reached = unit_of(plan.control), plan.grids, plan.reached
     bend = in_system(f"{d}/N", system)
     of = f"K = {bend.written(reached.bend)} {bend.unit}"
     console.print(
@@ -73,7 +66,7 @@ def print_plan(
     for word, unit in zip(words, units, strict=True):
         table.add_column(f"{word}, {unit.unit}", justify="right")
     table.add_column("readings", justify="right")
-    for s, count in chosen:
+    for s, count in plan.chosen:
         place = (s.gradient, s.pressure_Pa, s.deflection, s.force)
         numbers = (u.written(number, 5) for u, number in zip(units, place, strict=True))
         table.add_row(*numbers, str(count))
@@ -82,7 +75,7 @@ def print_plan(
         "\nThe softest gradient far out gives S1, the stiffest at full force K. A few readings"
         " between them show whether the bend is straight, which the ends alone cannot."
     )
-    console.print(_deflection_line(needs, reached.readings), highlight=False)
+    console.print(_deflection_line(plan.needs, reached.readings), highlight=False)
 
 
 def _deflection_line(needs: DeflectionNeeds, readings: int) -> str:

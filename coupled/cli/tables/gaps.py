@@ -3,21 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.table import Table
 
 from coupled.cli.tables.whole import print_whole
-from coupled.display import System, in_system, split_unit
+from coupled.display import System, in_system
 from coupled.gap.batch import Row
 from coupled.gap.findings.budget import StageBudget, share_of
 from coupled.gap.findings.flown import ChannelAgain
 from coupled.gap.findings.inflight import EffectInFlight
 from coupled.gap.findings.power import EffectPower
 from coupled.gap.findings.result import EffectResult, ParameterEstimate, StageResult
-from coupled.gap.findings.summary import change, figure, in_figures, labels, plain, sentences
+from coupled.gap.findings.summary import (
+    change,
+    figure,
+    in_units,
+    labels,
+    named_in,
+    plain,
+    sentences,
+    size_in,
+    summary_in,
+)
 
 if TYPE_CHECKING:
     from coupled.gap.findings.diagnosis import Diagnosis
@@ -26,8 +35,9 @@ if TYPE_CHECKING:
 def print_stages(console: Console, stages: Sequence[StageResult]) -> None:
     """Print the stages of a diagnosis: residual over floor, and what is left of it."""
     table = Table("stage", box=None)
-    for head in ("residual over floor", "with the effects", ""):
+    for head in ("residual over floor", "with the effects"):
         table.add_column(head, justify="right")
+    table.add_column("")  # remarks, of several lines where channels lack
     for stage in stages:
         if stage.gap is None:
             lacks = "lacks " + ", ".join(stage.missing)
@@ -75,33 +85,12 @@ def _number(parameter: ParameterEstimate | None) -> tuple[str, str]:
     return change(parameter), parameter.interval(figure)
 
 
-def in_units(parameter: ParameterEstimate, system: System) -> ParameterEstimate:
-    """Return a parameter with the rig's own number in the units of a system."""
-    if system == "si":
-        return parameter
-    unit = in_system(parameter.unit, system)
-
-    def to(value: float | None) -> float | None:
-        return None if value is None else unit.factor * value
-
-    return replace(
-        parameter,
-        unit=unit.unit,
-        filed=to(parameter.filed),
-        found=unit.factor * parameter.found,
-        found_low=to(parameter.found_low),
-        found_high=to(parameter.found_high),
-    )
-
-
 def in_words(whole: Diagnosis, system: System) -> str:
     """Return a diagnosis's summary; what is to be set in a rig file stays in the file's unit.
 
     Of two effects and more, a list of its sentences.
     """
-    text = whole.summary
-    for parameter in (p for effect in whole.effects for p in effect.parameters):
-        text = text.replace(change(parameter), change(in_units(parameter, system)))
+    text = summary_in(whole.summary, whole.effects, system)
     if len(whole.effects) < 2:
         return text
     return "\n".join(f"- {sentence}" for sentence in sentences(text))
@@ -115,7 +104,7 @@ def print_closed_loop(
     for head in ("rig as filed", "improved"):
         table.add_column(head, justify="right")
     for one in channels:
-        name, unit = _named(one.channel, system)
+        name, unit = named_in(one.channel, system)
         factor = in_system(unit, system).factor
         table.add_row(name, f"{factor * one.before:.3g}", f"{factor * one.after:.3g}")
     console.print()
@@ -134,19 +123,11 @@ def print_in_flight(
     for one in effects:
         for i, (name, by) in enumerate(one.changes.items()):
             first = ("", "") if i else (plain(one.name), f"{100 * one.share:.0f} %")
-            word, unit = _named(name, system)
+            word, unit = named_in(name, system)
             changed = in_system(unit, system).factor * by
             table.add_row(*first, word, f"{changed:.3g}", f"{100 * one.of_motion[name]:.3g} %")
     console.print()
     print_whole(console, table, ("changes by", "of its motion"))
-
-
-def _named(name: str, system: System) -> tuple[str, str]:
-    """Return a channel's or a parameter's name for people, and its unit in SI."""
-    stem, unit = split_unit(name)
-    if system == "si" or not unit:
-        return name, unit
-    return f"{plain(stem)}, {in_system(unit, system).unit}", unit
 
 
 def print_power(console: Console, sizes: Sequence[EffectPower], system: System = "si") -> None:
@@ -158,16 +139,11 @@ def print_power(console: Console, sizes: Sequence[EffectPower], system: System =
         elif not one.shows:
             least = "no size that it may have"
         else:
-            each = (_sized(name, value, system) for name, value in one.parameters)
+            each = (size_in(name, value, system) for name, value in one.parameters)
             least = ", ".join(each) or "it would show"
         table.add_row(one.name, one.stage, least)
     console.print()
     print_whole(console, table, ("stage",))
-
-
-def _sized(name: str, value: float, system: System) -> str:
-    word, unit = _named(name, system)
-    return f"{word} {in_figures(name, in_system(unit, system).factor * value)}"
 
 
 def print_summary(console: Console, rows: Sequence[Row]) -> None:

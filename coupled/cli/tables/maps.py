@@ -1,33 +1,13 @@
-"""Authority maps as tables, for CSV."""
+"""Stick forces as a table, for CSV."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from pathlib import Path
 
 import polars as pl
 
-from coupled.authority.maps import FELT, Feel, LossMap
-from coupled.record.channels import unit_of
+from coupled.authority.maps import FELT, Feel
 from coupled.record.csvfile import write_table
-
-
-def write_losses(maps: Iterable[LossMap], path: Path) -> None:
-    """Write the loss maps, a row a point; a deflection is in the unit beside it."""
-    rows = [
-        {
-            "control": loss_map.control,
-            "configuration": loss_map.configuration,
-            "dynamic_pressure_Pa": float(q),
-            "deflection": float(d),
-            "deflection_unit": unit_of(loss_map.control),
-            "loss": float(loss_map.loss[i, j]),
-        }
-        for loss_map in maps
-        for i, q in enumerate(loss_map.pressure_Pa)
-        for j, d in enumerate(loss_map.deflection)
-    ]
-    write_table(pl.DataFrame(rows).fill_nan(None), path)
 
 
 def write_feel(feel: Feel, path: Path) -> None:

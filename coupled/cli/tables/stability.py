@@ -1,32 +1,20 @@
-"""A rig's stability as tables: limits on a terminal, cells for CSV."""
+"""A rig's stability as a table on a terminal: its limits."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 
-import polars as pl
 from rich.console import Console
 from rich.table import Table
 
 from coupled.authority.stability.aircraft import BobWeight
 from coupled.authority.stability.limits import Limit, StabilityLimits
-from coupled.authority.stability.planes import Kind, Plane
+from coupled.authority.stability.planes import Kind
 from coupled.cli.tables.whole import print_whole
 from coupled.display import System, in_system
 from coupled.record.channels import unit_of
-from coupled.record.csvfile import write_table
-from coupled.rig.rig import Rig
 from coupled.units import MILLISECOND_s
 
-_QUANTITIES: dict[Kind, str] = {
-    "assumed": "assumed_over_real_bend",
-    "frame": "frame_s",
-    "hand": "hand_stiffness_times_bend",
-    "servo": "servo_frequency_Hz",
-    "gauge": "gauge_frequency_Hz",
-    "mass": "gauge_mass_over_loader_mass",
-}
 _WORDS: dict[Kind, tuple[str, float]] = {
     "assumed": ("K̂/K, free hand", 1.0),
     "frame": ("frame of a digital product, ms", 1.0 / MILLISECOND_s),
@@ -77,23 +65,3 @@ def _row(limit: Limit) -> tuple[str, ...]:
         return f" {word}", limit.stable, f"({ends})", "", own
     theory = "–" if limit.theory is None else f"{factor * limit.theory:.4g}"
     return f" {word}", limit.stable, f"{factor * limit.simulated:.4g}", theory, own
-
-
-def write_planes(rig: Rig, planes: Iterable[Plane], path: Path) -> None:
-    """Write the planes, a row a simulated cell."""
-    rows = [
-        {
-            "control": plane.control,
-            "quantity": _QUANTITIES[plane.kind],
-            "value": float(value),
-            "bend_times_gradient": float(share),
-            "gradient": float(share) / rig.controls[plane.control].loader.bend,
-            "gradient_unit": f"N/{unit_of(plane.control)}",
-            "simulated_growth_per_s": float(plane.simulated[i, j]),
-            "theory_growth_per_s": float(plane.theory[i, j]),
-        }
-        for plane in planes
-        for i, share in enumerate(plane.shares)
-        for j, value in enumerate(plane.values)
-    ]
-    write_table(pl.DataFrame(rows), path)

@@ -13,16 +13,18 @@ from rich.text import Text
 def print_whole(console: Console, table: Table, spare: Sequence[str] = ()) -> None:
     """Print a table; where its columns do not fit, a line a cell under the row's name.
 
-    Before that the columns whose heads are in `spare` are left out, the last one first, and
-    named: --wide shows them. A cell without a head, as a unit or a verdict, stands behind the one
-    before it.
+    Where it fits without some of the columns whose heads are in `spare`, those are left out, the
+    last one first, and named: --wide shows them. A cell without a head, as a unit or a verdict,
+    stands behind the one before it.
     """
+    every = table.columns
     left_out = _narrow(table, console.width, spare)
     if _needs(table) <= console.width:
         console.print(table, highlight=False)
         if left_out:
             console.print(f"[dim]--wide shows also: {', '.join(left_out)}[/]", highlight=False)
         return
+    table.columns = every
     first, *heads = [" ".join(str(one.header).split()).replace("- ", "") for one in table.columns]
     if table.title is not None:
         console.print(Text.from_markup(str(table.title), style="bold"))

@@ -1,6 +1,6 @@
 """Whether a machine changed since its healthy records: a test of simple features.
 
-A model that misses the healthy machine cannot judge by noise. What the model leaves of a signal,
+A model that misses the healthy machine cannot judge by noise. The residual of a signal,
 and the force itself, are therefore condensed to features of a whole record: the mean by direction,
 speed and position of the motion, the spread about these means, and the roughness, both as natural
 logarithms. One record gives one value of a feature, so the scatter between healthy records holds
@@ -250,7 +250,7 @@ def compare(
 def _signals(
     rig: Rig, control: ControlName, records: Sequence[Record], outputs: Sequence[Output]
 ) -> Signals:
-    """Return each record's signals by name: the force, and what the rig leaves of each output."""
+    """Return each record's signals by name: the force, and the residual of each output."""
     found = []
     for number, record in enumerate(records):
         names = (channel(control, quantity) for quantity in ("computed", "deflection"))

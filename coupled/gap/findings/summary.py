@@ -6,8 +6,9 @@ import json
 import math
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
-from coupled.display import unit_in
+from coupled.display import System, in_system, split_unit, unit_in
 from coupled.gap.effects.effect import dotted
 from coupled.gap.effects.library import BY_NAME
 from coupled.gap.findings.budget import StageBudget
@@ -365,3 +366,43 @@ def change(p: ParameterEstimate) -> str:
     by = f"{100 * (p.value - 1.0):+.3g} %" if p.relative else sign + figure(more)
     more_does = " or more" if p.at_least else ""
     return f"{figure(p.filed)} → {figure(p.found)}{unit}{more_does} ({by})"
+
+
+def in_units(parameter: ParameterEstimate, system: System) -> ParameterEstimate:
+    """Return a parameter with the rig's own number in the units of a system."""
+    if system == "si":
+        return parameter
+    unit = in_system(parameter.unit, system)
+
+    def to(value: float | None) -> float | None:
+        return None if value is None else unit.factor * value
+
+    return replace(
+        parameter,
+        unit=unit.unit,
+        filed=to(parameter.filed),
+        found=unit.factor * parameter.found,
+        found_low=to(parameter.found_low),
+        found_high=to(parameter.found_high),
+    )
+
+
+def size_in(name: str, value: float, system: System) -> str:
+    """Return a parameter's size with its name: `play_m 0.001`, in US units `play, in 0.05`."""
+    words, unit = named_in(name, system)
+    return f"{words} {in_figures(name, in_system(unit, system).factor * value)}"
+
+
+def named_in(name: str, system: System) -> tuple[str, str]:
+    """Return a channel's or a parameter's name for people, and its unit in SI."""
+    stem, unit = split_unit(name)
+    if system == "si" or not unit:
+        return name, unit
+    return f"{plain(stem)}, {in_system(unit, system).unit}", unit
+
+
+def summary_in(text: str, effects: Sequence[EffectResult], system: System) -> str:
+    """Return a summary in the units of a system; what is set in a rig file stays in the file's."""
+    for parameter in (p for effect in effects for p in effect.parameters):
+        text = text.replace(change(parameter), change(in_units(parameter, system)))
+    return text

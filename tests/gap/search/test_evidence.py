@@ -79,7 +79,7 @@ def test_samples_are_counted_by_the_set_that_leaves_least_of_each_output() -> No
     assert fewest_unexplained([first, second]) == pytest.approx([400.0, 500.0])
 
 
-def test_a_fit_of_the_same_set_begins_where_it_is_told() -> None:
+def test_a_fit_of_the_same_set_begins_at_the_given_start() -> None:
     """Not where its parent ended, which may be a local minimum that short replays lead out of."""
     one = problem(2e-4)
     parent = one.fit((BEND,))

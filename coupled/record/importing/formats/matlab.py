@@ -50,8 +50,8 @@ def read_matlab(path: Path, content: bytes, matrix: str, names: list[str] | str)
 def _load(path: Path, content: bytes) -> dict[str, Any]:
     """Return the variables; an exception on a damaged file ends this separate process.
 
-    scipy does not list the variables of a file with objects, and gives all objects one name, so
-    each variable of such a file is read by itself.
+    scipy does not list the variables of a file with objects, and before 1.18 gives all objects
+    one name, so each variable of such a file is read by itself.
     """
     if not _has_objects(content):
         return _load_together(path, content)
@@ -59,7 +59,7 @@ def _load(path: Path, content: bytes) -> dict[str, Any]:
     for name, variable in varmats_from_mat(io.BytesIO(content)):
         loaded = scipy_io.loadmat(variable, verify_compressed_data_integrity=True)
         value = loaded.get(name or "None")
-        own = _text(value.flat[0]["s0"]) if isinstance(value, MatlabOpaque) else name
+        own = _field(value, "s0") or name if isinstance(value, MatlabOpaque) else name
         if not own or own.startswith("__"):
             continue
         if own in found:
@@ -87,9 +87,13 @@ def _load_together(path: Path, content: bytes) -> dict[str, Any]:
     return {name: value for name, value in loaded.items() if not name.startswith("__")}
 
 
-def _text(value: Any) -> str:
-    """Return a word that scipy gives as bytes or as an array of letters."""
-    return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
+def _field(value: MatlabOpaque, *fields: str) -> str:
+    """Return the first of these fields that an object has, as text; "" if it has none."""
+    for field in fields:
+        if value.size and field in (value.dtype.names or ()):
+            word = value.flat[0][field]
+            return word.decode("utf-8", "replace") if isinstance(word, bytes) else str(word)
+    return ""
 
 
 def _collect(found: dict[str, Found], name: str, value: Any, depth: int) -> None:
@@ -97,7 +101,7 @@ def _collect(found: dict[str, Found], name: str, value: Any, depth: int) -> None
     if not isinstance(value, np.ndarray) or depth > DEEPEST or len(found) >= MOST_FIELDS:
         return
     if isinstance(value, MatlabOpaque):
-        found[name] = refused_object(name, value.flat[0]["s2"] if value.size else "")
+        found[name] = refused_object(name, _field(value, "s2", "_Class"))
     elif value.dtype.names is not None:
         for place, element in enumerate(value.flat):
             own = name if value.size == 1 else f"{name}({place + 1})"

@@ -51,6 +51,8 @@ MOTION = {
     "aileron_rad": "aileron|aileron position|aileron deflection|da",
     "rudder_rad": "rudder|rudder position|rudder deflection|dr",
 }
+# Short names of surfaces; in other units than an angle's they are a control's.
+SHORT = {"elev": "elevator_rad", "ail": "aileron_rad", "rud": "rudder_rad"}
 TIME = _set("time t timestamp stamp clock utc date datetime elapsed sec seconds")
 TORQUE = _set("torque moment nm")
 # Words of names that have a load or a state but are no part of a control.
@@ -109,6 +111,8 @@ def read_name(name: str, listed_unit: str = "", log: str = "") -> Reading:
             f" {spelling} " in f" {text} " for spelling in spellings.split("|") if " " in spelling
         ):
             return Reading(found, unit)
+    if text in SHORT and (not unit or _is(unit, "rad")):
+        return Reading(SHORT[text], unit)
     return _moved(words, unit, words_of(log)) or Reading("", unit)
 
 

@@ -62,8 +62,8 @@ class Proposal:
 def propose(files: Sequence[Path], rig: Rig | None = None) -> Proposal:
     """Return a map for a log, or for several of one test; the first one makes the frames.
 
-    A `rig`'s travels reduce the possible units. If no name tells what a column is, the map asks
-    which columns are force and deflection. Raises InputError for a file that is not a log.
+    A `rig`'s travels reduce the possible units. If no name identifies a column, the map has
+    questions on force and deflection. Raises InputError for a file that is not a log.
     """
     layout = guess_layout(files[0])
     read = [read_log(file, layout) for file in files]
@@ -101,7 +101,7 @@ def propose(files: Sequence[Path], rig: Rig | None = None) -> Proposal:
 def _skeleton(
     columns: Sequence[Column], rig: Rig | None, logs: Sequence[str]
 ) -> list[tuple[str, list[Line]]]:
-    """Return the sections of a map that asks for all, where no name says what a column is.
+    """Return the sections of a map with a question for each channel, if no name identifies one.
 
     Force and deflection are what the least diagnosis needs.
     """
