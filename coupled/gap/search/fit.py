@@ -6,7 +6,8 @@ outputs, the effects' parameters θ and the nuisance parameters φ, a fit minimi
     ½·Σ_o Σ r_o(θ, φ)²·u/u_o + ½·u·Σ ((φ − φ₀)/σ)²,    u_o = τ_o·max(q_o, 1),   u = min u_o
 
 q_o is the mean square of output o's residual and τ_o its autocorrelation time in frames, both where
-the fit starts. So u is one unit of −2 log-likelihood. An output that another effect disturbs weighs
+the fit starts; records of one channel share their u_o, the mean over its frames, since their noise
+and misfit are of one machine. So u is one unit of −2 log-likelihood. An output that another effect disturbs weighs
 less, and the nuisance parameters' Gaussian priors, the second sum, weigh against the data as they
 do in a posterior. Fits run in several legs, so the weights follow the residual.
 
@@ -184,7 +185,7 @@ def _fit(
         return [output.residual(rig, part, wide, rough) for output in ours]
 
     firsts = [np.array(first) / scale for first in _starts(effects, start)]
-    units = [_unit(left) for left in plain(firsts[0], wide=True)]
+    units = _units(ours, plain(firsts[0], wide=True))
     unit = min(units)
     weights = [math.sqrt(unit / one) for one in units]
 
@@ -225,7 +226,7 @@ def _fit(
             found = search.end(with_prior, [edge], (low, high), stepped)
             best = min(best, prior.without(found), key=lambda one: one.cost)
     free = _Free(keys, frees, scale, ends, weights, frames)
-    changed = _changed(units, best, free)
+    changed = _changed(units, best, free, ours)
     if legs > 1 and descent.steps != "wide" and changed > WEIGHT_CHANGED:
         again = dict(zip(keys, (best.x * scale).tolist(), strict=True))
         rest = replace(descent, slopes={})
@@ -313,9 +314,21 @@ def _unit(left: Floats) -> float:
     return max(float(np.mean(left**2)), 1.0) * memory(left)
 
 
-def _changed(units: Sequence[float], end: End, free: _Free) -> float:
+def _units(outputs: Sequence[Output], lefts: Sequence[Floats]) -> list[float]:
+    """Return the unit of each output's residual, the mean of those of its channel."""
+    channels = [(output.stage, output.channel) for output in outputs]
+    each = [_unit(left) for left in lefts]
+    found = []
+    for channel in channels:
+        same = [k for k, other in enumerate(channels) if other == channel]
+        frames = [len(lefts[k]) for k in same]
+        found.append(float(np.average([each[k] for k in same], weights=frames)))
+    return found
+
+
+def _changed(units: Sequence[float], end: End, free: _Free, outputs: Sequence[Output]) -> float:
     """Return by what factor the outputs' units changed most in a weighted fit."""
-    ended = [_unit(end.fun[rows] / weight) for rows, weight in free.parts()]
+    ended = _units(outputs, [end.fun[rows] / weight for rows, weight in free.parts()])
     return max(max(a / b, b / a) for a, b in zip(units, ended, strict=True))
 
 
