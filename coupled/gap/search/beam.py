@@ -156,9 +156,11 @@ def names_of(effects: Iterable[Effect]) -> Names:
 
 
 def may_be_true(problem: Problem, fitted: Fit) -> bool:
-    """Tell whether no effect is at a bound of a parameter, nor swings faster than frames show."""
+    """Tell whether each effect has a size, none at a bound nor faster than frames show."""
     fastest = 0.5 * min(output.frame_rate_Hz for output in problem.outputs)
     for effect in fitted.effects:
+        if not _has_size(problem.case, fitted, effect):
+            return False
         for p in effect.free:
             key = effect.value_key(p)
             if key in fitted.at_bound:
@@ -166,6 +168,16 @@ def may_be_true(problem: Problem, fitted: Fit) -> bool:
             if p.name == "frequency_Hz" and not p.folds and fitted.values[key] >= fastest:
                 return False
     return True
+
+
+def _has_size(case: Case, fitted: Fit, effect: Effect) -> bool:
+    """Tell whether the 95 % interval of a size excludes the neutral value; a limit has one."""
+    sizes = [p for p in effect.free if p.scanned]
+    for p in sizes:
+        key, none = effect.value_key(p), p.neutral(case.nominal, case.control)
+        if p.inverse or not fitted.low[key] <= none <= fitted.high[key]:
+            return True
+    return not sizes
 
 
 def _searched(
@@ -187,12 +199,13 @@ def _grow(beam: Beam, library: Sequence[Effect]) -> tuple[dict[str, float], ...]
     """Fit the neighbours of the best sets, depth by depth, until one explains every stage.
 
     Return the log evidence that each depth's sets gain, by the effect added. Discrete effects are
-    tried always: they have no size that could be too small.
+    tried without screening: they have no size that could be too small.
     """
     front, best, rounds = beam.leading(), beam.best, list[dict[str, float]]()
     if not best:
-        root = beam.fits[best]
-        _fit_sets(beam, [((e,), dict(root.values), root) for e in library if not e.free])
+        root, wide = beam.fits[best], beam.open_outputs(best)
+        discrete = [e for e in _beside((), library, wide) if not e.free]
+        _fit_sets(beam, [((e,), dict(root.values), root) for e in discrete])
         front = list(dict.fromkeys([best, beam.best]))
     for _ in range(BEAM_DEPTH):
         if not front or (best and not beam.open_outputs(best)):

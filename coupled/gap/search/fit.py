@@ -3,13 +3,14 @@
 The residuals are in noise floors, so each channel weighs by its noise. With the residual r of the
 outputs, the effects' parameters θ and the nuisance parameters φ, a fit minimises
 
-    ½·Σ_o Σ r_o(θ, φ)²·u/u_o + ½·u·Σ ((φ − φ₀)/σ)²,    u_o = τ_o·max(q_o, 1),   u = min u_o
+    ½·Σ_o Σ r_o(θ, φ)²·q/q_o + ½·u·Σ ((φ − φ₀)/σ)²,    q = min q_o,  u = min τ_o·q_o
 
-q_o is the mean square of output o's residual and τ_o its autocorrelation time in frames, both where
-the fit starts; records of one channel share their u_o, the mean over its frames, since their noise
-and misfit are of one machine. So u is one unit of −2 log-likelihood. An output that another effect disturbs weighs
-less, and the nuisance parameters' Gaussian priors, the second sum, weigh against the data as they
-do in a posterior. Fits run in several legs, so the weights follow the residual.
+q_o is the mean square of output o's residual, 1 at least, and τ_o its autocorrelation time in
+frames, both where the fit starts; records of one channel share their q_o, the mean over its frames,
+since their noise and misfit are of one machine. An output that another effect disturbs weighs less.
+u is one unit of −2 log-likelihood, so the nuisance parameters' Gaussian priors, the second sum,
+weigh against the data as they do in a posterior. Fits run in several legs, so the weights follow
+the residual.
 
 A fit returns its outcome: values, 95 % intervals, the information matrix, and which parameters are
 at a bound.
@@ -185,9 +186,9 @@ def _fit(
         return [output.residual(rig, part, wide, rough) for output in ours]
 
     firsts = [np.array(first) / scale for first in _starts(effects, start)]
-    units = _units(ours, plain(firsts[0], wide=True))
-    unit = min(units)
-    weights = [math.sqrt(unit / one) for one in units]
+    begun = plain(firsts[0], wide=True)
+    squares = _squares(ours, begun)
+    weights = [math.sqrt(min(squares) / one) for one in squares]
 
     def residual(scaled: Floats, wide: bool = False, rough: bool = False) -> Floats:
         lefts = zip(plain(scaled, wide, rough), weights, strict=True)
@@ -199,6 +200,7 @@ def _fit(
     ends = np.array([p.bounds(nominal, control) for p in frees]).T
     low, high = ends / scale
     stepped = any(output.stepped for output in ours)
+    unit = min(_unit(left) for left in begun)
     prior = _Priors.of([priors.get(key) for key in keys], scale, unit)
     # How the contact of dry friction yields is free beside any friction that is filed.
     rubs = any(one.dry for one in effects) or any(p.key in CONTACT for p in frees)
@@ -226,7 +228,7 @@ def _fit(
             found = search.end(with_prior, [edge], (low, high), stepped)
             best = min(best, prior.without(found), key=lambda one: one.cost)
     free = _Free(keys, frees, scale, ends, weights, frames)
-    changed = _changed(units, best, free, ours)
+    changed = _changed(squares, best, free, ours)
     if legs > 1 and descent.steps != "wide" and changed > WEIGHT_CHANGED:
         again = dict(zip(keys, (best.x * scale).tolist(), strict=True))
         rest = replace(descent, slopes={})
@@ -314,22 +316,20 @@ def _unit(left: Floats) -> float:
     return max(float(np.mean(left**2)), 1.0) * memory(left)
 
 
-def _units(outputs: Sequence[Output], lefts: Sequence[Floats]) -> list[float]:
-    """Return the unit of each output's residual, the mean of those of its channel."""
+def _squares(outputs: Sequence[Output], lefts: Sequence[Floats]) -> list[float]:
+    """Return the mean square of each output's channel, floors², 1 at least."""
     channels = [(output.stage, output.channel) for output in outputs]
-    each = [_unit(left) for left in lefts]
     found = []
     for channel in channels:
-        same = [k for k, other in enumerate(channels) if other == channel]
-        frames = [len(lefts[k]) for k in same]
-        found.append(float(np.average([each[k] for k in same], weights=frames)))
+        same = [left for left, other in zip(lefts, channels, strict=True) if other == channel]
+        found.append(max(float(np.mean(np.concatenate(same) ** 2)), 1.0))
     return found
 
 
-def _changed(units: Sequence[float], end: End, free: _Free, outputs: Sequence[Output]) -> float:
-    """Return by what factor the outputs' units changed most in a weighted fit."""
-    ended = _units(outputs, [end.fun[rows] / weight for rows, weight in free.parts()])
-    return max(max(a / b, b / a) for a, b in zip(units, ended, strict=True))
+def _changed(squares: Sequence[float], end: End, free: _Free, outputs: Sequence[Output]) -> float:
+    """Return by what factor the channels' mean squares changed most in a weighted fit."""
+    ended = _squares(outputs, [end.fun[rows] / weight for rows, weight in free.parts()])
+    return max(max(a / b, b / a) for a, b in zip(squares, ended, strict=True))
 
 
 def _plain(slope: Slope | None, weights: Floats) -> Slope | None:
