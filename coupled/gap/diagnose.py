@@ -90,7 +90,9 @@ def findings(prepared: Prepared, case: Case, choice: Choice) -> Diagnosis:
         effects=effects,
         budget=budget,
         rivals=tuple(
-            (s.effect.name, *(r.effect.name for r in s.rivals)) for s in choice.steps if s.rivals
+            tuple(dict.fromkeys((s.effect.name, *(r.effect.name for r in s.rivals))))
+            for s in choice.steps
+            if s.rivals
         ),
         settings=settings_of(choice, rig, control, outputs),
         shrink=shrink(case, fitted, floors),

@@ -221,6 +221,7 @@ REMAINDER = 0.02  # share of a gap, from which what is left counts: the wrong ef
 LEAST_REMAINDER = 0.02  # chosen: from which an effect is held beside a free model
 
 # Verdicts (`diagnose`).
+LIKELY = 0.5  # of the probability of all sets: the best one is more probable than all others
 CERTAIN = 0.6  # of 6 effects of 0.6 to 0.7 (seeds 603, 604, 2034) 5 were right, of 5 under that 2
 UNDETERMINED_MOST = 0.59  # below `CERTAIN`: of 135 opened records (seed 2039) it changes none
 MOST = 0.5  # of a guilty stage's gap, that certain effects must hold; the contract's

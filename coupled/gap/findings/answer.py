@@ -28,6 +28,7 @@ from coupled.gap.stages.stages import Reader
 from coupled.gap.thresholds import (
     CERTAIN,
     DOUBT,
+    LIKELY,
     MOST,
     STATED_MOST,
     SURE,
@@ -48,8 +49,10 @@ def verdict_of(
 
     An effect without alternative that is not certain counts as unexplained, since it may imitate
     a fault outside the library. `mostly`: residual structure remains, but the certain effects hold
-    at least `MOST` of every faulty stage's gap, or of all gaps together. Alternatives do not make
-    the verdict `ambiguous` if none of them is credible and the certain effects hold that share.
+    at least `MOST` of every faulty stage's gap, or of all gaps together. With alternatives the
+    verdict is `ambiguous` if no set of effects has more than half of the probability, or an effect
+    that has them is not certain; but not if none of them is credible and the certain effects hold
+    that share.
     """
     guilty = [stage.name for stage in stages if stage.guilty]
     blamed = {step.effect.stage for step in choice.steps}
@@ -66,9 +69,10 @@ def verdict_of(
         # A stage within a large noise floor may hide a gap.
         return "ambiguous" if any(stage.hidden is not None for stage in stages) else "no_gap"
     rivals = {step.effect.name for step in choice.steps if step.rivals}
-    if rivals and not (held and sure and rivals <= incredible(choice, effects)):
+    open_rivals = rivals - sure if choice.probability > LIKELY else rivals
+    if open_rivals and not (held and sure and rivals <= incredible(choice, effects)):
         return "ambiguous"
-    return "mostly" if left or rivals else "effect"
+    return "mostly" if left or open_rivals else "effect"
 
 
 def doubted(choice: Choice, effects: Sequence[EffectResult]) -> frozenset[str]:
@@ -105,20 +109,24 @@ def _held_together(
 def settings_of(
     choice: Choice, rig: Rig, control: ControlName, outputs: Sequence[Output]
 ) -> tuple[SettingResult, ...]:
-    """Return the fitted nuisance parameters, each as a factor on its filed value."""
+    """Return the fitted nuisance parameters, each as a factor on its filed value.
+
+    Without effects they are within their tolerance, as the stages are judged then.
+    """
+    fit = choice.fit if choice.steps else choice.settled
     found = []
     for setting in settings(rig, control, outputs).values():
         for p in setting.free:
-            value = choice.fit.values.get(setting.value_key(p))
+            value = fit.values.get(setting.value_key(p))
             filed = p.nominal(rig, control) if value is not None else 0.0
             if value is not None and filed:
                 factor = float(p.entered(filed, value) / filed)
                 name = field_of(rig, control, p.key)
                 found.append(SettingResult(name, setting.stage, factor))
     length = next((one.value_key(one.free[0]) for one in contact(rig, control)), "")
-    if is_dry(rig, control) and length in choice.fit.values:
+    if is_dry(rig, control) and length in fit.values:
         name = f"friction_yields_{unit_of(control)}"
-        found.append(SettingResult(name, "loader", yields=choice.fit.values[length]))
+        found.append(SettingResult(name, "loader", yields=fit.values[length]))
     return tuple(found)
 
 

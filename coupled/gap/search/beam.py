@@ -23,12 +23,13 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.gap.effects.effect import Effect, contains, distinct, keys_of
+from coupled.gap.effects.effect import Effect, contains, distinct, keys_of, value_of
+from coupled.gap.effects.settings import is_dry
 from coupled.gap.search.case import Case
 from coupled.gap.search.descent import Descent
 from coupled.gap.search.evidence import Evidence, evidence, fewest_unexplained
 from coupled.gap.search.found import Candidate, Choice, Fit, Found
-from coupled.gap.search.problem import Problem
+from coupled.gap.search.problem import EXACT, Problem
 from coupled.gap.search.screen import Screen, Screened, Worth
 from coupled.gap.signals.output import explained_below, stage_gaps, stage_limits
 from coupled.gap.thresholds import (
@@ -73,7 +74,7 @@ def search_sets(case: Case, library: Sequence[Effect]) -> tuple[Case, Choice]:
         known = [problem.fit(one.effects, one.values, None, OWN) for one in ends]
         case, (beam, more) = anew, _searched(problem, library, known)
         rounds = (*rounds, *more)
-    return case, _choice(beam, rounds)
+    return case, _with_contact_named(beam, _choice(beam, rounds), library)
 
 
 @dataclass
@@ -147,7 +148,11 @@ class Beam:
         first, limits = case.gaps(self.settled.rig), stage_limits(case.outputs)
         rig = self.fits[names].rig if names else self.settled.rig
         left = case.gaps(rig) if names == self.best else stage_gaps(case.outputs, rig)
-        return {at for at, gap in left.items() if gap > explained_below(first[at], limits[at])}
+        explained = {
+            at: limit if at in EXACT else explained_below(first[at], limit)
+            for at, limit in limits.items()
+        }
+        return {at for at, gap in left.items() if gap > explained[at]}
 
 
 def names_of(effects: Iterable[Effect]) -> Names:
@@ -231,15 +236,37 @@ def _grow(beam: Beam, library: Sequence[Effect]) -> tuple[dict[str, float], ...]
 def _look_around(beam: Beam, library: Sequence[Effect]) -> None:
     """Fit what the best set is without each effect, and with each law next to one of its own.
 
-    A law that the best one contains is fitted from this one's nuisance parameters as well.
+    A law that the best one contains is fitted from this one's nuisance parameters as well. A law of
+    several parameters may be equivalent to two effects of fewer: these are fitted, too.
     """
     while beam.best:
         best, fitted = beam.best, beam.fits[beam.best]
         fewer = [one for one in _without(fitted) if names_of(one[0]) not in beam.fits]
         _fit_sets(beam, [*fewer, *_laws(beam, fitted, library)])
+        for law in fitted.effects:
+            if (part := _part_of(beam, law)) is not None:
+                beside = _beside(part.effects, library, {*law.shows_in})
+                worth = Worth(PRIOR_EFFECT, beam.counts)
+                screened = beam.screen.best(part, beside, worth, BEAM_BESIDE)
+                _fit_sets(beam, [t for one in screened for t in _tries(part, one, beam.contact)])
         _finish(beam)
         if beam.best == best:
             return
+
+
+def _part_of(beam: Beam, law: Effect) -> Fit | None:
+    """Return the best fit with an effect of fewer parameters in place of a law of the best set.
+
+    Both show in the same output. None where there is none, or its neighbours were fitted.
+    """
+    rest = beam.best - {law.name}
+    for names in beam.ranked():
+        if len(names) == len(beam.best) and rest < names:
+            (other,) = (one for one in beam.fits[names].effects if one.name not in rest)
+            if len(other.free) < len(law.free) and {*other.shows_in} & {*law.shows_in}:
+                grown = any(names < more for more in beam.fits)
+                return None if grown else beam.fits[names]
+    return None
 
 
 def _expand(beam: Beam, fitted: Fit, library: Sequence[Effect], wide: set[str]) -> None:
@@ -484,9 +511,7 @@ def _choice(beam: Beam, rounds: tuple[dict[str, float], ...]) -> Choice:
         rivals = tuple(
             Candidate(gain - (float(logs[0]) - beam.log(names)), other, beam.fits[names])
             for names in ranked
-            if beam.log(names) > logs[0] - RIVAL_GAIN
-            and best - names == {effect.name}
-            and len(names) == len(best)
+            if beam.log(names) > logs[0] - RIVAL_GAIN and _in_its_place(best, names, effect)
             for other in beam.fits[names].effects
             if other.name in names - best and not contains(other, effect)
         )
@@ -494,4 +519,40 @@ def _choice(beam: Beam, rounds: tuple[dict[str, float], ...]) -> Choice:
     base = beam.log(frozenset())
     tried = {next(iter(names)): beam.log(names) - base for names in beam.fits if len(names) == 1}
     steps.sort(key=lambda step: -step.gain)
-    return Choice(tuple(steps), fitted, beam.settled, tried, rounds)
+    return Choice(tuple(steps), fitted, beam.settled, tried, rounds, float(weights[0]))
+
+
+def _in_its_place(best: Names, other: Names, effect: Effect) -> bool:
+    """Tell whether another set has other effects in place of this one of the best set.
+
+    One takes the place of one, two of one, or one of two.
+    """
+    gone, new = best - other, other - best
+    return effect.name in gone and len(new) >= 1 and min(len(gone), len(new)) == 1
+
+
+def _with_contact_named(beam: Beam, choice: Choice, library: Sequence[Effect]) -> Choice:
+    """Return a choice with the law whose parameters include how the dry friction found yields.
+
+    How friction yields is a nuisance parameter in the search (`distinct`). Where the rig file has
+    no friction, and the 95 % interval of its length excludes that of a rigid contact, the law with
+    these parameters is named.
+    """
+    problem, fitted = beam.problem, choice.fit
+    case = problem.case
+    if not case.contact or is_dry(case.nominal, case.control):
+        return choice
+    length = case.contact[0].value_key(case.contact[0].free[0])
+    kept = distinct(library, case.contact)
+    for step in choice.steps:
+        law = next((e for e in library if e not in kept and contains(e, step.effect)), None)
+        if law is None or fitted.low.get(length, 0.0) <= 0.0:
+            continue
+        numbers = {p: value_of(fitted.rig, case.control, p.key) for p in law.free}
+        start = {law.value_key(p): float(value) for p, value in numbers.items()}
+        effects = tuple(law if one is step.effect else one for one in fitted.effects)
+        named = problem.fit(effects, {**fitted.values, **start}, None, OWN)
+        if may_be_true(problem, named):
+            steps = [replace(s, effect=law) if s is step else s for s in choice.steps]
+            return replace(choice, steps=tuple(steps), fit=named)
+    return choice

@@ -82,7 +82,7 @@ class Choice:
 
     `settled` is the fit without effects, its nuisance parameters within their tolerance; `tried`
     the gain in log evidence of each effect alone, `rounds` that of the sets of each depth, by the
-    effect added.
+    effect added, `probability` the posterior probability of the best set.
     """
 
     steps: tuple[Found, ...]
@@ -90,3 +90,4 @@ class Choice:
     settled: Fit
     tried: dict[str, float] = field(default_factory=dict)
     rounds: tuple[dict[str, float], ...] = ()
+    probability: float = 1.0

@@ -22,7 +22,7 @@ from coupled.gap.thresholds import MISMATCH
 from coupled.rig.rig import Rig
 
 Floats = NDArray[np.float64]
-EXACT = ("schedule", "compensation")  # outputs of the host's arithmetic
+EXACT = ("schedule", "compensation", "linkage")  # the host's arithmetic; laws solved exactly
 NORMAL_95 = 1.96  # standard deviations from the mean to an end of a 95 % interval
 
 
@@ -134,7 +134,7 @@ class Problem:
         """Return the variance of each output's residual, noise floors², shape (outputs,).
 
         The noise's, and that of the physics' own error: a share of what the rig without effects
-        leaves. The host's arithmetic is exact.
+        leaves. The host's arithmetic is exact, and servo, play and bend are solved exactly.
         """
         gaps = np.array([output.gap(without) for output in self.outputs])
         error = np.array([0.0 if one.stage in EXACT else MISMATCH for one in self.outputs])
