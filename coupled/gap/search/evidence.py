@@ -14,6 +14,9 @@ For a set E of effects with parameters θ, nuisance parameters φ, and outputs o
     H = Σ_o J_oᵀJ_o/(τ_o·max(q_o, 1))  information matrix of the log-likelihood
     S = diag(s)                       prior widths, so that s·√(2π) is 1/(prior density at the fit)
 
+Where the floor holds the error of a model of the healthy machine, which is no noise, a residual
+below it is no evidence, and q_o is 1 at least.
+
 The last term is Laplace's: how much of the prior volume the data leave. A size's prior is uniform
 in its logarithm over Λ = ln 10⁴, so s = |θ̂ − θ₀|·Λ/√(2π), with θ₀ where the effect does nothing; it
 is no less than that of the size's own standard error. The evidence is then the same in any unit.
@@ -76,6 +79,8 @@ def evidence(problem: Problem, fitted: Fit, variance: Floats) -> Evidence:
     """Return the evidence of the set of a fit; `variance` is v_o, shape (outputs,)."""
     lefts = [output.residual(fitted.rig) for output in problem.outputs]
     squares = np.array([float(np.mean(left**2)) for left in lefts]) / variance
+    if problem.case.only_wide:
+        squares = np.maximum(squares, 1.0)
     counts = np.array([len(left) / memory(left) for left in lefts])
     rest = sum(
         _laplace(problem, members, group) - group.penalty
