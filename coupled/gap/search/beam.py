@@ -206,7 +206,8 @@ def _grow(beam: Beam, library: Sequence[Effect]) -> tuple[dict[str, float], ...]
     Return the log evidence that each depth's sets gain, by the effect added. Discrete effects are
     tried without screening: they have no size that could be too small.
     """
-    front, best, rounds = beam.leading(), beam.best, list[dict[str, float]]()
+    front, best, known = beam.leading(), beam.best, set(beam.fits)
+    depths = list[tuple[Names, set[Names]]]()
     if not best:
         root, wide = beam.fits[best], beam.open_outputs(best)
         discrete = [e for e in _beside((), library, wide) if not e.free]
@@ -215,7 +216,6 @@ def _grow(beam: Beam, library: Sequence[Effect]) -> tuple[dict[str, float], ...]
     for _ in range(BEAM_DEPTH):
         if not front or (best and not beam.open_outputs(best)):
             break
-        base, known = beam.log(front[0]), set(beam.fits)
         for names in front:
             if wide := beam.open_outputs(names):
                 _expand(beam, beam.fits[names], library, wide)
@@ -224,13 +224,16 @@ def _grow(beam: Beam, library: Sequence[Effect]) -> tuple[dict[str, float], ...]
             break
         _finish(beam)
         _shoot(beam)
-        rounds.append({beam.fits[one].effects[-1].name: beam.log(one) - base for one in new})
+        depths.append((front[0], new))
         if beam.best == best:
             break
-        best = beam.best
+        best, known = beam.best, set(beam.fits)
         front = [names for names in beam.leading() if names and names not in front]
     _look_around(beam, library)
-    return tuple(rounds)
+    return tuple(
+        {beam.fits[one].effects[-1].name: beam.log(one) - beam.log(base) for one in new}
+        for base, new in depths
+    )
 
 
 def _look_around(beam: Beam, library: Sequence[Effect]) -> None:
