@@ -156,7 +156,8 @@ def test_a_residual_that_nothing_explains_is_held_against_everything(tmp_path: P
     record = made(tmp_path, nominal, {}, 5).between(0.0, 12.0)
     data = record.data.copy()
     at = record.channels.index("column_deflection_m")
-    data[:, at] += np.where(np.sin(record.time_s * 9.0) > 0.6, 2e-3, 0.0)
+    jumps = np.where(np.sin(record.time_s * 9.0) > 0.6, 2e-3, 0.0)
+    data[:, at] += jumps - jumps.mean()  # a mean would be a zero that is off
     spoiled = Record(record.channels, data)
     diagnosis = diagnose(nominal, {"r.csv": spoiled}, "column")
     assert diagnosis.verdict == "unexplained"

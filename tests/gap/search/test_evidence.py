@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -85,3 +86,22 @@ def test_a_fit_of_the_same_set_begins_at_the_given_start() -> None:
     parent = one.fit((BEND,))
     begun = one.fit((BEND,), {**parent.values, KEY: 5e-4}, parent, Descent("wide", 1))
     assert begun.values[KEY] == pytest.approx(5e-4)
+
+
+def test_a_residual_below_the_error_of_a_healthy_model_is_no_evidence() -> None:
+    """The floor is then the model's misfit: a smaller residual is as well explained."""
+    half = problem(1e-4, 1e-4)
+    loud = [replace(output, floor=2.0 * output.floor) for output in half.case.outputs]
+    for only_wide, square in ((False, 0.25), (True, 1.0)):
+        one = Problem(replace(half.case, outputs=loud, only_wide=only_wide))
+        found = evidence(one, one.fit(()), np.ones(1))
+        assert found.squares == pytest.approx([square], rel=0.1)
+
+
+@pytest.mark.parametrize(("channel", "alike"), [("column_deflection_m", True), ("other", False)])
+def test_records_of_one_channel_weigh_alike(channel: str, alike: bool) -> None:
+    """Noise and misfit are of one machine; another channel weighs by its own misfit."""
+    one, two = (problem(bend).case.outputs[0] for bend in (1.2e-4, 3e-4))
+    outputs = [one, replace(two, channel=channel, record=1)]
+    fitted = Problem(Case(bench({"bend_m_per_N": 1e-4}), "column", outputs)).fit((BEND,))
+    assert (fitted.values[KEY] == pytest.approx(2.1e-4, rel=3e-3)) == alike
