@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from itertools import groupby
 from typing import TYPE_CHECKING
 
-from coupled.authority.held import dry_friction
+from coupled.authority.held import breakaway_force
 from coupled.display import System, percent, shown
 from coupled.errors import listed
 from coupled.record.channels import SURFACES, unit_of
@@ -127,7 +127,7 @@ def remarks(flights: Sequence[Flight], system: System = "si") -> list[str]:
     the rig that are guesses.
     """
     cases = [list(group) for _, group in groupby(flights, key=lambda f: f.outcome.case)]
-    held = next(filter(None, (further(case, system) for case in cases)), "")
+    held = next(filter(None, (explain_loss(case, system) for case in cases)), "")
     said = [_without_correction(flights), *_resting(cases, system), *_saturated(cases), held]
     said.append(guessed(flights))
     return list(filter(None, said))
@@ -187,7 +187,7 @@ def _resting(cases: Sequence[Sequence[Flight]], system: System) -> Iterator[str]
         if not some:
             continue
         loader = some[0].manoeuvre.rig.controls[some[0].manoeuvre.control].loader
-        rubs = dry_friction(loader)
+        rubs = breakaway_force(loader)
         pull = max(flight.outcome.force_N for flight in some)
         force, breakout, friction = (
             f"{unit.factor * each:.3g} {unit.unit}" for each in (pull, loader.breakout, rubs)
@@ -231,7 +231,7 @@ def _saturated(cases: Sequence[Sequence[Flight]]) -> Iterator[str]:
         )
 
 
-def further(case: Sequence[Flight], system: System = "si") -> str:
+def explain_loss(case: Sequence[Flight], system: System = "si") -> str:
     """Return why authority is lost under a force that moves the surface as on the rigid rig.
 
     Empty if the hand does not hold a force, or moves no further for it.
@@ -243,13 +243,13 @@ def further(case: Sequence[Flight], system: System = "si") -> str:
     moved = [
         flight.outcome
         for flight in case
-        if _feels_too_soft(flight.manoeuvre)
+        if _is_uncorrected(flight.manoeuvre)
         and abs(flight.outcome.hand_travel_norm) - abs(rigid.hand_travel_norm) > _NOTICED
         and flight.outcome.loss > 0.0
     ]
     if not moved:
         return ""
-    bent, alike = moved[0], goes_as_far(moved[0], rigid)
+    bent, alike = moved[0], moves_surface_alike(moved[0], rigid)
     size, unit = _travel(manoeuvre, system)
     where = f" ({bent.case})" if manoeuvre.label != manoeuvre.name else ""
     travels = [size * abs(each.hand_travel_norm) for each in (*moved, rigid)]
@@ -259,7 +259,7 @@ def further(case: Sequence[Flight], system: System = "si") -> str:
     others = [
         f"{each.configuration} {written[number]} and {percent(each.loss, 0)}"
         for number, each in enumerate(moved[1:], start=1)
-        if goes_as_far(each, rigid) is alike
+        if moves_surface_alike(each, rigid) is alike
     ]
     surface = "the surface goes about as far, while" if alike else "and"
     more = f" Likewise {listed(others)}." if others else ""
@@ -290,7 +290,7 @@ def sweep_remarks(manoeuvre: Manoeuvre, configurations: Sequence[Configuration])
     useless = [name for name, each in flown.items() if _corrects_nothing(each)]
     if useless:
         said.append(_says_no_correction(manoeuvre, useless))
-    if holds_force(manoeuvre) and any(_feels_too_soft(each) for each in flown.values()):
+    if holds_force(manoeuvre) and any(_is_uncorrected(each) for each in flown.values()):
         said.append(
             "The pilot holds a force: on a structure that bends, the hand goes further for it, and"
             " without correction the surface goes about as far as on a rigid one. What is lost is a"
@@ -299,7 +299,7 @@ def sweep_remarks(manoeuvre: Manoeuvre, configurations: Sequence[Configuration])
     return said
 
 
-def _feels_too_soft(manoeuvre: Manoeuvre) -> bool:
+def _is_uncorrected(manoeuvre: Manoeuvre) -> bool:
     """Tell whether a control bends and its host corrects neither gradient nor deflection."""
     host = manoeuvre.rig.controls[manoeuvre.control].compensation
     return _bends(manoeuvre) and (host.bend == 0.0 or not (host.gradient or host.deflection))
@@ -311,6 +311,6 @@ def holds_force(manoeuvre: Manoeuvre) -> bool:
     return pilot is not None and pilot.kind in _FORCES
 
 
-def goes_as_far(bent: Outcome, rigid: Outcome) -> bool:
+def moves_surface_alike(bent: Outcome, rigid: Outcome) -> bool:
     """Tell whether a surface moves about as far as on the rigid rig."""
     return abs(bent.reached_norm - rigid.reached_norm) <= _ALIKE * abs(rigid.reached_norm)

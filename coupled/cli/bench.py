@@ -1,4 +1,4 @@
-"""The command of the virtual bench: bench."""
+"""The command `bench`: a simulated calibration bench."""
 
 from __future__ import annotations
 

@@ -42,7 +42,7 @@ def make(
         str, typer.Option(metavar="ADDRESS", help="A dask scheduler's, to make them there.")
     ] = "",
 ) -> None:
-    """Write sealed records of an independent twin, with and without effects; the key elsewhere."""
+    """Write sealed records of an independent twin, with and without effects, and their key."""
     from coupled.blind.trials.make import make as make_trials
 
     processes, address = check_cluster(workers, cluster)

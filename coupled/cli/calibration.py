@@ -1,4 +1,4 @@
-"""The command that calibrates from readings, or plans them: calibrate."""
+"""The command `calibrate`: calibrates from readings, or plans them."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ def calibrate(
 
 
 def _say_default(rig: str) -> None:
-    """Say whose values were taken where no rig was named."""
+    """Print which rig's values are used if none is named."""
     if not rig:
         say_note(f"no --rig given: travel, arc, gains and gradients are {DEFAULT_RIG}'s")
 

@@ -16,7 +16,7 @@ from coupled.cli.app import (
     app,
     check_cluster,
 )
-from coupled.cli.process import asked_to_stop
+from coupled.cli.process import was_interrupted
 from coupled.cli.progress import progress
 from coupled.cli.reporting import ReportOption, check_report, say_report, write_report
 from coupled.cli.rigs import say_guesses
@@ -43,7 +43,7 @@ def check(
     report: ReportOption = None,
     units: UnitsOption = "si",
 ) -> None:
-    """Fly runs and hold them against their expectations; exit code 1 if any fails."""
+    """Fly runs and evaluate their expectations; exit code 1 if any fails."""
     from coupled.campaign.check import check as check_runs
     from coupled.campaign.check import read_expecting
     from coupled.campaign.junit import junit_xml
@@ -63,7 +63,7 @@ def check(
     notes = [say_guesses(rig) for rig in {s.rig.name: s.rig for s, *_ in found}.values()]
     with progress() as advance:
         checked = check_runs(found, advance)
-    if asked_to_stop():  # what was flown of the last run says nothing of it
+    if was_interrupted():  # the last run is incomplete
         raise KeyboardInterrupt
     table = [verdict.as_dict() for verdict in checked.verdicts]
     with Outputs() as outputs:
@@ -114,7 +114,7 @@ def sweep(
     overlay: OverlayOption = False,
     size: SizeOption = "",
 ) -> None:
-    """Fly a run over values of its parameters, to one table; called again, it goes on."""
+    """Fly a run over values of its parameters, to one table; the same command resumes it."""
     from coupled.campaign.journal import JOURNAL
     from coupled.campaign.plan import read_plan
     from coupled.campaign.sensitivity import INDICES
@@ -154,7 +154,7 @@ def sweep(
 
 
 def _say_found(found: int, flights: int) -> None:
-    """Say how many flights the folder has already."""
+    """Print how many flights the folder has already."""
     if found == flights:
         text = f"all {flights} flights are there already; none is flown again"
         err.print(text, highlight=False)
@@ -169,7 +169,7 @@ def _show(
     json_file: str,
     handed: tuple[Path | None, System],
 ) -> None:
-    """Draw and print a sweep's table, with its indices or boundaries where they are asked for.
+    """Draw and print a sweep's table, with indices or boundaries if requested.
 
     `figure` is the figure's file and layout, `handed` the report's file, if any, and the units.
     """

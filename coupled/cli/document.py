@@ -1,4 +1,4 @@
-"""The command of the force documentation: document."""
+"""The command `document`: force documentation and control checks."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def document(
 ) -> None:
     """Document a rig's forces: X-Y plots, figure 4, and 14 CFR Part 60 control checks.
 
-    A check that fails gives exit code 1, and the table says why.
+    A check that fails gives exit code 1, and the table has the reason.
     """
     from coupled.calibration.documentation import controls_of
     from coupled.calibration.forcedocument import document_rig
@@ -129,7 +129,7 @@ def document(
 
 
 def _print(documents: Sequence[Documentation], every: bool, judged: bool, units: System) -> None:
-    """Print each control's checks, and why some fail; `judged` is whether surfaces are."""
+    """Print each control's checks and reasons; `judged`: surfaces are checked too."""
     from coupled.calibration.reasons import reasons
     from coupled.cli.tables.calibration import print_checks
 

@@ -1,4 +1,4 @@
-"""The command that takes a loader to JSBSim: export."""
+"""The command `export`: writes a loader as JSBSim systems."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def export(
     file = find(rig, shipped_rigs(), "rig")
     check_folder(jsbsim)
     check_json(json_file, [file])
-    exported, cases = _asked(read_rig(file), rig, run or [], case)
+    exported, cases = _select(read_rig(file), rig, run or [], case)
     flown, others = exportable(exported, cases)
     with progress() as advance:
         made = make(exported, flown, file, rate, not no_check, advance)
@@ -63,8 +63,8 @@ def export(
     give_json([one.as_dict() for one in made.beside], json_file)
 
 
-def _asked(rig: Rig, name: str, runs: list[str], case: str) -> tuple[Rig, list[Manoeuvre]]:
-    """Return the rig to export, and the cases whose scripts are asked for."""
+def _select(rig: Rig, name: str, runs: list[str], case: str) -> tuple[Rig, list[Manoeuvre]]:
+    """Return the rig to export, and the cases of the scripts."""
     from coupled.exporting.folder import runs_of
     from coupled.flight.runfile import read_run
 

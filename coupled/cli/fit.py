@@ -1,4 +1,4 @@
-"""The command that makes a nominal rig from records of a healthy machine: fit."""
+"""The command `fit`: fits a nominal rig to records of a healthy machine."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def fit(
     json_file: JsonOption = "",
     wide: WideOption = False,
 ) -> None:
-    """Fit a nominal rig to records of a healthy machine, and say what they do not determine."""
+    """Fit a nominal rig to records of a healthy machine, and list what they do not determine."""
     from coupled.gap.nominal import fit_nominal
     from coupled.rig.rigfile import read_rig
 

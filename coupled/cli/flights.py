@@ -80,7 +80,7 @@ def compare(
     with progress() as advance:
         flights = compare_flights(cases, advance)
     stopped = flights[-1].ended_early.startswith("interrupted")
-    no_figure = no_figure or stopped  # who has interrupted waits for no drawing
+    no_figure = no_figure or stopped  # no drawing after an interruption
     table = flights.as_dict()
     with timed("draw and write"), Outputs() as outputs:
         if not no_figure:
@@ -159,7 +159,7 @@ def fly(
 
 
 def _labelled(label: str, cases: Sequence[Manoeuvre], run: str) -> Manoeuvre:
-    """Return the case of a run with a label. Raises InputError where it has none."""
+    """Return the case of a run with a label. Raises InputError if there is none."""
     by_label = {each.label: each for each in cases}
     if label not in by_label:
         raise InputError(run, "--case", f"no case {label!r}; {nearest(label, by_label)}")
@@ -211,7 +211,7 @@ def _sentence(card: str) -> str:
 
 
 def _end(flights: Sequence[Flight]) -> None:
-    """End a command by what ended its flights before their time, if anything did."""
+    """Exit with the reason if a flight ended early."""
     early = [flight.ended_early for flight in flights if flight.ended_early]
     if early:
         stopped = any(why.startswith("interrupted") for why in early)

@@ -1,4 +1,4 @@
-"""The command of the gap between a rig and its records: one, several, or a folder of them."""
+"""The command `diagnose`, for one record, several, or a folder of records."""
 
 from __future__ import annotations
 
@@ -184,7 +184,7 @@ def _print(
         say(f"figure: {figure}")
 
 
-# Why a rig that is improved has a key that is no effect's number.
+# Reasons of keys in an improved rig that are no effect's parameters.
 _GOES_WITH = "which goes with what was found; it has no effect of its own"
 _BESIDE = {
     "servo_damping_ratio": "since a file gives both numbers of a servo or none",
@@ -242,7 +242,7 @@ def _report(
     inputs: list[Path],
     handed: tuple[Diagnosis, bool, str, System],
 ) -> None:
-    """Write a diagnosis's report; `handed` is it, with power or without, a note, and units."""
+    """Write the report of a diagnosis; `handed` has it, its power or None, a note and units."""
     whole, power, note, units = handed
     if path is None:
         return
@@ -273,7 +273,7 @@ def _diagnose_folder(
     control: ControlName,
     place: tuple[int, str],
 ) -> None:
-    """Diagnose a control in every record of a folder, each alone; print and write a summary."""
+    """Diagnose a control in each record of a folder; print and write a summary."""
     from coupled.cli.tables.gaps import print_summary
     from coupled.gap.batch import LIST, jobs, run_all, summary
     from coupled.record.record import manifest_path

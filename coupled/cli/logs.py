@@ -1,4 +1,4 @@
-"""The command that takes in a user's own log: import."""
+"""The command `import`: converts a user's log to a record."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def import_log(
     ] = "",
     json_file: JsonOption = "",
 ) -> None:
-    """Make a record of your own log, and say whether each channel is plausible."""
+    """Convert your own log to a record, and report whether each channel is plausible."""
     if map_file is not None and suggest is not None:
         problem = "give a map, or --suggest to have one proposed: one of the two"
         raise InputError("coupled import", "--map", problem)

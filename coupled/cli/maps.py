@@ -1,4 +1,4 @@
-"""The command of the authority maps: map."""
+"""The command `map`: authority maps and stick forces."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The commands about JSBSim's models: models, new rig."""
+"""The commands `models` and `new rig`: JSBSim's models, and first rigs for them."""
 
 from __future__ import annotations
 
@@ -137,7 +137,7 @@ def _bench(
     control: ControlName,
     units: System,
 ) -> None:
-    """Write a rig without an aircraft; at a terminal, ask for what is not given."""
+    """Write a rig without an aircraft; on a terminal, prompt for numbers not given."""
     from coupled.rig.rigfile import rig_from_table
     from coupled.schema import loads_toml
     from coupled.surveying.benchrig import answer, bench_rig, questions, split_answers, yes
@@ -158,7 +158,7 @@ def _bench(
     if log is None and sys.stdin is not None and sys.stdin.isatty():
         if "servo" not in answers:
             servo = typer.confirm("a servo or motor moves the control?", default=False)
-        numbers = _asked(control, numbers, servo, units)
+        numbers = _prompt_for_numbers(control, numbers, servo, units)
     text = bench_rig(path.stem, control, numbers, servo, found, shown(log.name) if log else "")
     rig_from_table(loads_toml(text, path), path)  # a rig that cannot be flown is refused
     write_new(path, text, ".toml", f"coupled new run --rig {path}")
@@ -183,10 +183,10 @@ def _logged(log: Path, map_file: Path | None) -> Record:
         raise InputError(log, error.key, problem) from None
 
 
-def _asked(
+def _prompt_for_numbers(
     control: ControlName, known: dict[str, float], servo: bool, units: System
 ) -> dict[str, float]:
-    """Return the numbers known and those that a person answers; an empty answer is a guess."""
+    """Return the known numbers and the answers to prompts; an empty answer is a guess."""
     from coupled.surveying.benchrig import answer, guesses, questions
 
     found = dict(known)
@@ -209,7 +209,7 @@ def _asked(
 
 
 def _print_found(found: LogNumbers, control: ControlName, units: System) -> None:
-    """Print what a log gives of a control, and how sure it is."""
+    """Print the numbers of a control found in a log, with their errors."""
     from coupled.surveying.benchrig import found_in, questions
 
     numbers, sure = found_in(found)
@@ -225,7 +225,7 @@ def _print_found(found: LogNumbers, control: ControlName, units: System) -> None
 
 
 def _for_model(model: str, file: Path | None) -> None:
-    """Write a first rig for a JSBSim model: where it trims, found; its loader, guessed."""
+    """Write a first rig for a JSBSim model: its trim is computed, its loader guessed."""
     from coupled.surveying.draft import draft
     from coupled.surveying.survey import survey
 
@@ -245,7 +245,7 @@ def _for_model(model: str, file: Path | None) -> None:
 
 
 def _model(word: str) -> tuple[str, Path, bool]:
-    """Return a model's name, the folder that its own lies in, and whether it is unknown."""
+    """Return a model's name, the folder of a user's own model, and whether it is unknown."""
     from coupled.surveying.survey import known_models
 
     known = known_models()

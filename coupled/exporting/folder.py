@@ -39,7 +39,7 @@ def write_export(made: Export, folder: Path) -> None:
             "rig": made.rig.name,
             "loader_steps": made.substeps,
             "left_out": list(made.left),
-            "only_scripted": list(made.scripted),
+            "is_scripted": list(made.scripted),
             "beside": [one.as_dict() for one in made.beside],
             "files": sorted(map(str, files)),
         }

@@ -185,7 +185,7 @@ def _check_section(section: Section, path: str, d: str, file: object) -> list[st
     return left
 
 
-def only_scripted(rig: Rig) -> list[str]:
+def is_scripted(rig: Rig) -> list[str]:
     """Return the settings of a rig's aircraft made by scripts only, a line each with key and why.
 
     Without a script, as in FlightGear, the exported aircraft does not have them.

@@ -16,7 +16,7 @@ from coupled.flight.wrapper import Aircraft, Hook, Wrapper
 from coupled.record.channels import SURFACES, ControlName
 from coupled.rig.control import ControlArray
 from coupled.rig.packing import COMMAND_SIGN
-from coupled.rig.serving import lead, led
+from coupled.rig.serving import service_command, set_service
 from coupled.schema import Section, named, quantity
 
 Move = Callable[[float], None]  # to a share of the whole, from 0 to 1
@@ -113,8 +113,8 @@ def _service(controls: ControlArray, names: Sequence[str], event: Event) -> Move
 
     def move(share: float) -> None:
         nonlocal begun
-        begun = led(controls, names, control, service) if begun is None else begun
-        lead(controls, names, control, service, begun + (to - begun) * share)
+        begun = service_command(controls, names, control, service) if begun is None else begun
+        set_service(controls, names, control, service, begun + (to - begun) * share)
 
     return move
 

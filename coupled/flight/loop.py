@@ -84,9 +84,9 @@ def fly(
     data = _noise(channels, rig.noise, frames, manoeuvre.seed)
     noise = data.copy() if lateness(rig) else None
     looks = _looks(controls, names, actions)
-    served = Served(manoeuvre, controls, companion is not None and companion.leads)
-    elsewhere = companion is not None and companion.elsewhere
-    placed = Placed(controls, script, data, rig.frame_rate, elsewhere)
+    served = Served(manoeuvre, controls, companion is not None and companion.sets_services)
+    real_loader = companion is not None and companion.real_loader
+    placed = Placed(controls, script, data, rig.frame_rate, real_loader)
     flight = Frames(manoeuvre, airframe, placed, served, looks, companion, progress)
     beside = (served, flight.extra)
     if companion is not None:

@@ -22,7 +22,7 @@ from coupled.record.channels import ControlName, record_channels, unit_of
 from coupled.rig.equations import bend_loss, felt_gradient
 from coupled.rig.parameters import Control, PlainName
 from coupled.rig.rig import Rig
-from coupled.rig.serving import check_led, has_services, service_channels
+from coupled.rig.serving import check_service, has_services, service_channels
 from coupled.rig.structure import Structure
 from coupled.schema import Given, Section, build, quantity
 
@@ -235,7 +235,7 @@ class Manoeuvre:
         for name, event in self.conditions.event.items():
             if event.service is not None:
                 control, to = str(event.control), float(event.to or 0.0)
-                check_led(self.rig, control, event.service, to, self.file, f"event.{name}")
+                check_service(self.rig, control, event.service, to, self.file, f"event.{name}")
 
 
 def configure(rig: Rig, configuration: Configuration) -> Rig:

@@ -11,7 +11,7 @@ from coupled.flight.event import service_events
 from coupled.flight.manoeuvre import Manoeuvre
 from coupled.rig.control import ControlArray
 from coupled.rig.services import SERVICE_CHANNELS
-from coupled.rig.serving import noted, service_channels
+from coupled.rig.serving import copy_service_rows, service_channels
 
 Floats = NDArray[np.float64]
 Frame = Callable[[int, tuple[float, ...]], tuple[float, float, float]]
@@ -52,7 +52,7 @@ class Served:
         def served(k: int, motion: tuple[float, ...]) -> tuple[float, float, float]:
             happen()
             commands = frame(k, motion)
-            noted(self._controls, self._names, self._which, rows[k])
+            copy_service_rows(self._controls, self._names, self._which, rows[k])
             return commands
 
         return served

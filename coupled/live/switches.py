@@ -46,15 +46,15 @@ class Switches:
     """The switches of a flight.
 
     `rig` is the current rig, `controls` the same in the kernels' arrays, `hands` those of its
-    pilots; `elsewhere`: the loader is real. `set_rig` is the rig after the user's last change.
+    pilots; `real_loader`: the loader is real. `set_rig` is the rig after the user's last change.
     `differs`: `rig` has other settings than at the start.
     """
 
     def __init__(
-        self, rig: Rig, controls: ControlArray, hands: Mapping[str, Hand], elsewhere: bool
+        self, rig: Rig, controls: ControlArray, hands: Mapping[str, Hand], real_loader: bool
     ) -> None:
         self.rig = self.set_rig = self._begun = rig
-        self._controls, self._hands, self._elsewhere = controls, hands, elsewhere
+        self._controls, self._hands, self._real_loader = controls, hands, real_loader
         self.changes: list[Change] = []
         self.differs = False
 
@@ -81,7 +81,7 @@ class Switches:
         name, place = self._control(control), f"{control}.{what}"
         if what not in KEYS:
             raise InputError("switch", place, f"is no switch; {nearest(what, KEYS)}")
-        if what in HARDWARE and self._elsewhere:
+        if what in HARDWARE and self._real_loader:
             raise InputError("switch", place, "is set on the real loader itself; change it there")
         if what in _WIDEST and value > _WIDEST[what]:
             raise InputError("switch", place, f"is {value:g} N; at most {_WIDEST[what]:g}")

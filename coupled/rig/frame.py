@@ -14,7 +14,7 @@ from coupled.rig.compensation import estimate, misses
 from coupled.rig.compiled import entry, seldom, stage
 from coupled.rig.control import ControlArray, ControlParameters, ControlState
 from coupled.rig.gauge import start_gauge
-from coupled.rig.hand import only_scripted
+from coupled.rig.hand import is_scripted
 from coupled.rig.inertia import set_inertia
 from coupled.rig.joining import bend_by_others, leak_from_others
 from coupled.rig.linkage import deflection, start_bend, transducer
@@ -29,7 +29,7 @@ from coupled.rig.modification import (
 from coupled.rig.reach import free, stop_again
 from coupled.rig.schedule import gradients, read_pressure
 from coupled.rig.sensing import converted, read_computed, read_force
-from coupled.rig.services import asked_of_surface, begin_services, note_services
+from coupled.rig.services import begin_services, commanded_deflection, note_services
 from coupled.rig.surface import command_surface
 
 Floats = NDArray[np.float64]
@@ -108,8 +108,10 @@ def host_frame(
         bent = estimate(p.compensation, computed_read, force_read)
         host.estimated = bent + s.crossing.estimated
     estimated = host.estimated
-    asked = asked_of_surface(p.services, s.services, estimated) if s.services.on else estimated
-    command = command_surface(p.surface, s.surface, asked, pressure)
+    commanded = (
+        commanded_deflection(p.services, s.services, estimated) if s.services.on else estimated
+    )
+    command = command_surface(p.surface, s.surface, commanded, pressure)
 
     out[0] = force_read
     out[1] = computed_read
@@ -172,7 +174,7 @@ def run_joined(controls: ControlArray, script: Floats, k: int, load_factor: floa
             p, s = controls[i].parameters, controls[i].state
             bend_by_others(controls, i)
             leak_from_others(controls, i, script, node)
-            scripted = only_scripted(p.hand) and p.reach.reach == 0.0
+            scripted = is_scripted(p.hand) and p.reach.reach == 0.0
             run_node(p, s, script[i, 0], script[i, 1], begun, node, scripted)
     settle_others(controls)
 

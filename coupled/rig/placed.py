@@ -28,7 +28,7 @@ _BESIDE = WHOLE_MOTION + 3  # the motion, the second and third command, and the 
 class Placed:
     """A flight's arrays for `step_frame_at`, kept alive: those of `step_frame`.
 
-    Column 0 of the record is the time, at `frame_rate_Hz`. `elsewhere`: hand and loader are
+    Column 0 of the record is the time, at `frame_rate_Hz`. `real_loader`: hand and loader are
     measured, not simulated; only the host's part is computed.
 
     `run_column` takes `address`, the frame's number and the longitudinal motion (SI, in the
@@ -42,7 +42,7 @@ class Placed:
         script: Floats,
         record: Floats,
         frame_rate_Hz: float,
-        elsewhere: bool = False,
+        real_loader: bool = False,
     ) -> None:
         assert all(array.flags.c_contiguous for array in (controls, script, record))
         kernels = _kernels()
@@ -54,7 +54,7 @@ class Placed:
                 *(controls.ctypes.data, len(controls)),
                 *(script.ctypes.data, script.shape[2]),
                 *(record.ctypes.data, *record.shape),
-                *(elsewhere, beside.ctypes.data, kernels.step_frame),
+                *(real_loader, beside.ctypes.data, kernels.step_frame),
             ]
         )
         self.address = int(self._place.ctypes.data)

@@ -249,6 +249,6 @@ class Mouse:
 def test_a_live_flight_by_mouse_has_no_gap() -> None:
     """The hand's force comes in steps: what a smoother takes off that is no noise."""
     live = rig_live("report-column", 25.0)
-    record = fly_live(live, Plan(paced=False, wishes=Mouse())).record
+    record = fly_live(live, Plan(paced=False, hand_positions=Mouse())).record
     found = api.diagnose("report-column", record)
     assert (found.verdict, found.guilty) == ("no_gap", ())

@@ -35,7 +35,7 @@ def starts_of(case: Case, effect: Effect) -> list[dict[str, float]]:
 
 
 def pushes(seed: int, amplitude_N: float = 45.0) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return a pilot's force: holds of random size and length, with a sweep on top."""
+    """Return a pilot's force: holds of random size and length plus a sweep."""
     rng = np.random.default_rng(seed)
     t = np.arange(round(LONG_s * 120) + 1) / 120
     force = 0.2 * amplitude_N * np.sin(2 * np.pi * (0.1 + 0.0125 * t) * t) * (t < LONG_s - 3)
@@ -50,7 +50,7 @@ def pushes(seed: int, amplitude_N: float = 45.0) -> tuple[NDArray[np.float64], N
 
 
 def nominal_rig(flown: bool) -> Rig:
-    """Return the rig that a diagnosis is held against."""
+    """Return the nominal rig of a diagnosis."""
     if flown:
         return read_run("worst-case-t37")[0].rig
     table = {**BENCH, "frame_rate_Hz": 120.0}

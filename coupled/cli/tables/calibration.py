@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 def print_calibration(console: Console, found: CalibrationResult, system: System = "si") -> None:
-    """Print what readings tell: the figures, how far to trust them, and which to use."""
+    """Print a calibration: the figures, their errors, and which to use."""
     table = Table(box=None, pad_edge=False)
     table.add_column("", no_wrap=True)
     for head in HEADS:
@@ -40,7 +40,7 @@ def print_calibration(console: Console, found: CalibrationResult, system: System
 
 
 def print_plan(console: Console, plan: ReadingsPlan, system: System = "si") -> None:
-    """Print how precise K gets by grids of readings, and the fewest that reach what is wanted."""
+    """Print the precision of K for grids of readings, and the smallest sufficient one."""
     d, grids, reached = unit_of(plan.control), plan.grids, plan.reached
     bend = in_system(f"{d}/N", system)
     of = f"K = {bend.written(reached.bend)} {bend.unit}"
@@ -79,7 +79,7 @@ def print_plan(console: Console, plan: ReadingsPlan, system: System = "si") -> N
 
 
 def _deflection_line(needs: DeflectionNeeds, readings: int) -> str:
-    """Return what the readings give of the deflection, and what it takes to have it right."""
+    """Return the expected error of the deflection, and the readings that 0.5 % requires."""
     wanted = f"{100 * needs.wanted:g} %"
     text = "Compensated with these, the aircraft gets the deflection to"
     text += f" {100 * needs.half_width:.2g} % (95 %)."
@@ -97,7 +97,7 @@ def _deflection_line(needs: DeflectionNeeds, readings: int) -> str:
 
 
 def print_coverage(console: Console, coverage: Coverage) -> None:
-    """Print how often intervals held the truth."""
+    """Print how often intervals contained the true value."""
     table = Table(box=None, pad_edge=False)
     table.add_column(f"{coverage.benches} benches", no_wrap=True)
     table.add_column("", justify="right")
@@ -116,7 +116,7 @@ def print_coverage(console: Console, coverage: Coverage) -> None:
     print_whole(console, table)
 
 
-_ROUNDED = 1e-9  # of N, s, ° or %: less is a computer's rounding
+_ROUNDED = 1e-9  # of N, s, ° or %: less is rounding
 
 
 def print_checks(
@@ -127,9 +127,9 @@ def print_checks(
     why: Sequence[str] = (),
     system: System = "si",
 ) -> None:
-    """Print a control's checks: those that fail and each kind's narrowest, or every one.
+    """Print a control's checks: failed ones and the narrowest of each kind, or all.
 
-    `why` says why some fail.
+    `why` has the reasons of failures.
     """
     shown = list(checks) if every else _narrowest(checks)
     table = Table(box=None, pad_edge=False)
@@ -154,7 +154,7 @@ def print_checks(
 
 
 def _narrowest(checks: Sequence[ControlCheck]) -> list[ControlCheck]:
-    """Return every check that fails, and of each kind the one with the least margin."""
+    """Return the failed checks, and the check with the least margin of each kind."""
     least: dict[str, ControlCheck] = {}
     for check in checks:
         kind = check.name.split(",")[0]

@@ -1,4 +1,4 @@
-"""Verdicts and sweeps on a terminal of 80 columns: a row an expectation, a row a figure."""
+"""Verdicts and sweeps on a terminal of 80 columns."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _SHOWN = 6  # parameters of a figure, the strongest
 
 
 def print_verdicts(console: Console, verdicts: Sequence[Verdict], system: System = "si") -> None:
-    """Print a table a case, figures with their units, and how many passed."""
+    """Print a table for each case, figures with their units, and the number passed."""
     for (run, case), group in groupby(verdicts, key=lambda v: (v.run, v.case)):
         console.print(escape(run if run == case else f"{run}: {case}"), style="bold")
         table = Table("", "expected of", box=None, pad_edge=False)
@@ -51,7 +51,7 @@ def _cells(verdict: Verdict, system: System) -> tuple[str, ...]:
 def print_sweep(
     console: Console, found: pl.DataFrame, figures: Sequence[str], system: System = "si"
 ) -> None:
-    """Print how each figure lies over the flights that did not end early, and why others did."""
+    """Print each figure's distribution over complete flights, and why others ended early."""
     flown = found.filter(pl.col("ended_early") == "")
     table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0))
     table.add_column("", no_wrap=True)
@@ -75,13 +75,13 @@ def print_sweep(
 
 
 def _named(name: str, unit: str) -> str:
-    """Return a figure's name in words, with the unit that it is shown in."""
+    """Return a figure's name in words, with its unit."""
     plain = name.removesuffix(f"_{unit_in(name)}") if unit_in(name) else name
     return f"{plain.replace('_', ' ')}, {unit}" if unit else plain.replace("_", " ")
 
 
 def print_indices(console: Console, indices: Sequence[SobolIndex]) -> None:
-    """Print of each figure the parameters that matter most, by their total index."""
+    """Print the parameters with the largest total index for each figure."""
     table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0))
     table.add_column("shares of the variance", overflow="fold")
     for head in ("alone", "95 %", "with others", "95 %"):
@@ -107,7 +107,7 @@ def _shares(index: SobolIndex) -> tuple[str, ...]:
 
 
 def print_survival(console: Console, limits: Sequence[SurvivalLimit]) -> None:
-    """Print what each configuration survives, and its boundary beside the closed form's."""
+    """Print each configuration's boundary of survival, and that of the closed form."""
     if not limits:
         return
     table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0))

@@ -26,7 +26,7 @@ def print_numbers(console: Console, fitted: NominalFit) -> None:
 
 
 def print_channels(console: Console, channels: Sequence[ChannelFit]) -> None:
-    """Print how far each channel stays from its prediction on stretches held out, rms."""
+    """Print the RMS error of each channel's prediction on held-out data."""
     table = Table("channel, rms off on stretches held out", box=None)
     for head in ("as filed", "fitted", "noise alone", "it moves by"):
         table.add_column(head, justify="right")

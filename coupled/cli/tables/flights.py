@@ -1,4 +1,4 @@
-"""Tables for a terminal of 80 columns: a row a figure, a column a configuration or a case."""
+"""Comparisons on a terminal of 80 columns: rows are figures, columns configurations or cases."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def print_comparison(console: Console, flights: Sequence[Flight], system: System = "si") -> None:
-    """Print a comparison: its card, and a table a case (one in all for a single configuration)."""
+    """Print a comparison: its card, and a table for each case or single configuration."""
     run = flights[0].manoeuvre
     width = min(92, console.width)
     console.print(Panel(escape(" ".join(run.card.split())), title=escape(run.name), width=width))
@@ -53,7 +53,7 @@ def _print_table(
 
 
 def _broken(head: str) -> str:
-    """Return a column's head on lines of its own where it is long, a remark on the last."""
+    """Return a column's heading, broken if it is long, with a remark on the last line."""
     head, bracket, remark = head.partition(" (")
     last = f"\n{remark.rstrip(')')}" if bracket else ""
     if head.endswith("compensated"):

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 
 def print_stages(console: Console, stages: Sequence[StageResult]) -> None:
-    """Print the stages of a diagnosis: residual over floor, and what is left of it."""
+    """Print the stages of a diagnosis: residual over the noise floor, before and after."""
     table = Table("stage", box=None)
     for head in ("residual over floor", "with the effects"):
         table.add_column(head, justify="right")
@@ -79,16 +79,16 @@ def print_effects(
 
 
 def _number(parameter: ParameterEstimate | None) -> tuple[str, str]:
-    """Return a parameter's change and interval, in the rig's own number."""
+    """Return a parameter's change and interval, in the rig's unit."""
     if parameter is None:
         return "", ""
     return change(parameter), parameter.interval(figure)
 
 
 def in_words(whole: Diagnosis, system: System) -> str:
-    """Return a diagnosis's summary; what is to be set in a rig file stays in the file's unit.
+    """Return a diagnosis's summary; values for a rig file are in the file's unit.
 
-    Of two effects and more, a list of its sentences.
+    For two or more effects it is a list of sentences.
     """
     text = summary_in(whole.summary, whole.effects, system)
     if len(whole.effects) < 2:
@@ -99,7 +99,7 @@ def in_words(whole: Diagnosis, system: System) -> str:
 def print_closed_loop(
     console: Console, channels: Sequence[ChannelAgain], system: System = "si"
 ) -> None:
-    """Print how far the flights with the record's pilot stay from it, before and after."""
+    """Print the error of flights with the record's pilot, before and after."""
     table = Table("flown again with the record's pilot, rms off by", box=None)
     for head in ("rig as filed", "improved"):
         table.add_column(head, justify="right")
@@ -114,7 +114,7 @@ def print_closed_loop(
 def print_in_flight(
     console: Console, effects: Sequence[EffectInFlight], system: System = "si"
 ) -> None:
-    """Print what leaving each effect out does to the flight, and its share of what all do."""
+    """Print the change of the flight without each effect, and its share of the total."""
     table = Table("in flight", box=None)
     table.add_column("share", justify="right")
     table.add_column("channel")
@@ -131,7 +131,7 @@ def print_in_flight(
 
 
 def print_power(console: Console, sizes: Sequence[EffectPower], system: System = "si") -> None:
-    """Print the least size of each effect that the records would have shown."""
+    """Print the smallest detectable size of each effect."""
     table = Table("effect", "stage", "would have shown from", box=None)
     for one in sizes:
         if not one.judged:
@@ -147,7 +147,7 @@ def print_power(console: Console, sizes: Sequence[EffectPower], system: System =
 
 
 def print_summary(console: Console, rows: Sequence[Row]) -> None:
-    """Print a line a record: verdict, effects, stages."""
+    """Print a line for each record: verdict, effects, stages."""
     table = Table("record", "verdict", "effects", "guilty", "closed", box=None)
     for row in rows:
         closed = "" if row.closed is None else f"{row.closed:.3f}"

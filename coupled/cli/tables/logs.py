@@ -1,4 +1,4 @@
-"""The account of an import, on a terminal of 80 columns."""
+"""The report of an import on a terminal of 80 columns."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ LISTED = 12  # unmapped columns named on the terminal; the manifest has all
 
 
 def print_account(console: Console, account: ImportAccount) -> None:
-    """Print how the clock was read, a row a channel, and what was left out."""
+    """Print the clock, a row for each channel, and what was omitted."""
     console.print(clock_in_words(account.clock), highlight=False)
     table = Table(box=None, pad_edge=False)
     table.add_column("channel", no_wrap=True)
@@ -38,7 +38,7 @@ def print_account(console: Console, account: ImportAccount) -> None:
 
 
 def print_proposal(console: Console, proposal: Proposal) -> None:
-    """Print which column a proposed map takes for which channel, and what it asks."""
+    """Print the column of each channel in a proposed map, and its open questions."""
     table = Table(box=None, pad_edge=False)
     table.add_column("channel", no_wrap=True)
     table.add_column("from")
@@ -54,7 +54,7 @@ def print_proposal(console: Console, proposal: Proposal) -> None:
 
 
 def clock_in_words(clock: ClockAccount) -> str:
-    """Return how the rows of the log became frames of the record."""
+    """Return a text on how rows of the log became frames of the record."""
     rows = f"{clock.rows_used} of {clock.log_rows} rows at {clock.log_rate_Hz:.4g} Hz"
     if clock.method == "pchip":
         steps = f"{1e3 * clock.least_step_s:.3g} to {1e3 * clock.greatest_step_s:.3g} ms"

@@ -1,4 +1,4 @@
-"""Stick forces as a table, for CSV."""
+"""Stick forces as a CSV table."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from coupled.record.csvfile import write_table
 
 
 def write_feel(feel: Feel, path: Path) -> None:
-    """Write the stick forces, a row a speed."""
+    """Write the stick forces, a row for each speed."""
     columns = {
         "calibrated_airspeed_m_per_s": feel.calibrated_airspeed_m_per_s,
         "dynamic_pressure_Pa": feel.pressure_Pa,

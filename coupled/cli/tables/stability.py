@@ -1,4 +1,4 @@
-"""A rig's stability as a table on a terminal: its limits."""
+"""Limits of stability on a terminal."""
 
 from __future__ import annotations
 

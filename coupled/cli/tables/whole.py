@@ -1,4 +1,4 @@
-"""A table that no terminal cuts: where it is too narrow, each row is written downwards."""
+"""A table that fits any terminal: on a narrow one, each row is written as lines."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from rich.text import Text
 
 
 def print_whole(console: Console, table: Table, spare: Sequence[str] = ()) -> None:
-    """Print a table; where its columns do not fit, a line a cell under the row's name.
+    """Print a table; if its columns do not fit, a line for each cell under the row's name.
 
     Where it fits without some of the columns whose heads are in `spare`, those are left out, the
     last one first, and named: --wide shows them. A cell without a head, as a unit or a verdict,
@@ -30,7 +30,7 @@ def print_whole(console: Console, table: Table, spare: Sequence[str] = ()) -> No
         console.print(Text.from_markup(str(table.title), style="bold"))
     for row in zip(*(column.cells for column in table.columns), strict=True):
         name, *cells = (Text.from_markup(str(cell)) for cell in row)
-        if first and table.columns[0].justify == "right":  # a number, which says nothing alone
+        if first and table.columns[0].justify == "right":  # a number, which has no meaning alone
             name = Text(f"{first}: ") + name
         if name.plain:
             console.print(name, style="bold")
@@ -48,7 +48,7 @@ def print_whole(console: Console, table: Table, spare: Sequence[str] = ()) -> No
 def _narrow(table: Table, width: int, spare: Sequence[str]) -> list[str]:
     """Take spare columns off a table until it fits a width; return their heads.
 
-    None where it does not fit without them either: a list has room for all.
+    None if it does not fit without them either: the list then has all columns.
     """
     left_out, every = list[str](), table.columns
     for head in reversed(spare):
@@ -63,7 +63,7 @@ def _narrow(table: Table, width: int, spare: Sequence[str]) -> list[str]:
 
 
 def _needs(table: Table) -> int:
-    """Return the columns of a terminal that a table needs for its words and numbers whole."""
+    """Return the width that a table needs without breaking words and numbers."""
     _, right, _, left = table.padding
     width = len(table.columns) * (left + right) - (0 if table.pad_edge else left + right)
     for column in table.columns:
