@@ -253,8 +253,33 @@ def _look_around(beam: Beam, library: Sequence[Effect]) -> None:
                 screened = beam.screen.best(part, beside, worth, BEAM_BESIDE)
                 _fit_sets(beam, [t for one in screened for t in _tries(part, one, beam.contact)])
         _finish(beam)
+        _restart_simpler(beam)
         if beam.best == best:
             return
+
+
+def _restart_simpler(beam: Beam) -> None:
+    """Fit simpler sets with dry friction again, from the filed nuisance parameters.
+
+    With dry friction the cost has local minima. One of a simpler set must not decide for the best
+    set, whose further parameters lead out of it.
+    """
+    problem, numbers = beam.problem, _numbers(beam.fits[beam.best])
+    leading = [beam.fits[names] for names in beam.leading() if names]
+    simpler = [f for f in leading if _numbers(f) < numbers and any(e.dry for e in f.effects)]
+
+    def again(fitted: Fit) -> Fit:
+        start = {k: v for k, v in fitted.values.items() if k not in problem.priors}
+        return problem.fit(fitted.effects, problem.case.neutral | start)
+
+    for fitted in in_threads(again, simpler):
+        beam.add(fitted)
+    beam.recount()
+
+
+def _numbers(fitted: Fit) -> int:
+    """Return how many parameters a set's effects have."""
+    return sum(len(effect.free) for effect in fitted.effects)
 
 
 def _part_of(beam: Beam, law: Effect) -> Fit | None:
@@ -467,6 +492,9 @@ def _go_on(beam: Beam, begun: Sequence[Begun]) -> None:
 
     for fit in in_threads(go_on, begun):
         beam.add(fit)
+        names = names_of(fit.effects)
+        if beam.fits[names] is fit:
+            beam.finished.discard(names)
     beam.recount()
 
 
