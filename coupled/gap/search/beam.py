@@ -204,13 +204,14 @@ def _grow(beam: Beam, library: Sequence[Effect]) -> tuple[dict[str, float], ...]
     """Fit the neighbours of the best sets, depth by depth, until one explains every stage.
 
     Return the log evidence that each depth's sets gain, by the effect added. Discrete effects are
-    tried without screening: they have no size that could be too small.
+    tried without screening, since they have no size that could be too small: in outputs that are
+    open, and in those whose laws are exact, where a high noise floor may hide them.
     """
     front, best, known = beam.leading(), beam.best, set(beam.fits)
     depths = list[tuple[Names, set[Names]]]()
     if not best:
-        root, wide = beam.fits[best], beam.open_outputs(best)
-        discrete = [e for e in _beside((), library, wide) if not e.free]
+        root, shown = beam.fits[best], {*EXACT, *beam.open_outputs(best)}
+        discrete = [e for e in _beside((), library, shown) if not e.free]
         _fit_sets(beam, [((e,), dict(root.values), root) for e in discrete])
         front = list(dict.fromkeys([best, beam.best]))
     for _ in range(BEAM_DEPTH):
