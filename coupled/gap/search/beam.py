@@ -254,26 +254,32 @@ def _look_around(beam: Beam, library: Sequence[Effect]) -> None:
                 screened = beam.screen.best(part, beside, worth, BEAM_BESIDE)
                 _fit_sets(beam, [t for one in screened for t in _tries(part, one, beam.contact)])
         _finish(beam)
-        _restart_simpler(beam)
+        _restart_as_simple(beam)
         if beam.best == best:
             return
 
 
-def _restart_simpler(beam: Beam) -> None:
-    """Fit simpler sets with dry friction again, from the filed nuisance parameters.
+def _restart_as_simple(beam: Beam) -> None:
+    """Fit sets with dry friction that are as simple as the best from other nuisance parameters.
 
-    With dry friction the cost has local minima. One of a simpler set must not decide for the best
-    set, whose further parameters lead out of it.
+    With dry friction the cost has local minima. One of a set with no more parameters must not
+    decide for the best set. Fits start from the nuisance parameters as filed, and from the best
+    set's.
     """
-    problem, numbers = beam.problem, _numbers(beam.fits[beam.best])
-    leading = [beam.fits[names] for names in beam.leading() if names]
-    simpler = [f for f in leading if _numbers(f) < numbers and any(e.dry for e in f.effects)]
+    problem, best = beam.problem, beam.fits[beam.best]
+    numbers = _numbers(best)
+    leading = [beam.fits[names] for names in beam.leading() if names and names != beam.best]
+    simpler = [f for f in leading if _numbers(f) <= numbers and any(e.dry for e in f.effects)]
 
-    def again(fitted: Fit) -> Fit:
-        start = {k: v for k, v in fitted.values.items() if k not in problem.priors}
-        return problem.fit(fitted.effects, problem.case.neutral | start)
+    of_best = {key for effect in best.effects for key in map(effect.value_key, effect.free)}
+    shared = {key: value for key, value in best.values.items() if key not in of_best}
 
-    for fitted in in_threads(again, simpler):
+    def again(fitted: Fit) -> list[Fit]:
+        own = {k: v for k, v in fitted.values.items() if k not in problem.priors}
+        starts = (problem.case.neutral | own, {**fitted.values, **shared})
+        return [problem.fit(fitted.effects, start) for start in starts]
+
+    for fitted in (one for fits in in_threads(again, simpler) for one in fits):
         beam.add(fitted)
     beam.recount()
 
