@@ -204,13 +204,14 @@ def _grow(beam: Beam, library: Sequence[Effect]) -> tuple[dict[str, float], ...]
     """Fit the neighbours of the best sets, depth by depth, until one explains every stage.
 
     Return the log evidence that each depth's sets gain, by the effect added. Discrete effects are
-    tried without screening: they have no size that could be too small.
+    tried without screening, since they have no size that could be too small: in outputs that are
+    open, and in those whose laws are exact, where a high noise floor may hide them.
     """
     front, best, known = beam.leading(), beam.best, set(beam.fits)
     depths = list[tuple[Names, set[Names]]]()
     if not best:
-        root, wide = beam.fits[best], beam.open_outputs(best)
-        discrete = [e for e in _beside((), library, wide) if not e.free]
+        root, shown = beam.fits[best], {*EXACT, *beam.open_outputs(best)}
+        discrete = [e for e in _beside((), library, shown) if not e.free]
         _fit_sets(beam, [((e,), dict(root.values), root) for e in discrete])
         front = list(dict.fromkeys([best, beam.best]))
     for _ in range(BEAM_DEPTH):
@@ -253,8 +254,39 @@ def _look_around(beam: Beam, library: Sequence[Effect]) -> None:
                 screened = beam.screen.best(part, beside, worth, BEAM_BESIDE)
                 _fit_sets(beam, [t for one in screened for t in _tries(part, one, beam.contact)])
         _finish(beam)
+        _restart_as_simple(beam)
         if beam.best == best:
             return
+
+
+def _restart_as_simple(beam: Beam) -> None:
+    """Fit sets with dry friction that are as simple as the best from other nuisance parameters.
+
+    With dry friction the cost has local minima. One of a set with no more parameters must not
+    decide for the best set. Fits start from the nuisance parameters as filed, and from the best
+    set's.
+    """
+    problem, best = beam.problem, beam.fits[beam.best]
+    numbers = _numbers(best)
+    leading = [beam.fits[names] for names in beam.leading() if names and names != beam.best]
+    simpler = [f for f in leading if _numbers(f) <= numbers and any(e.dry for e in f.effects)]
+
+    of_best = {key for effect in best.effects for key in map(effect.value_key, effect.free)}
+    shared = {key: value for key, value in best.values.items() if key not in of_best}
+
+    def again(fitted: Fit) -> list[Fit]:
+        own = {k: v for k, v in fitted.values.items() if k not in problem.priors}
+        starts = (problem.case.neutral | own, {**fitted.values, **shared})
+        return [problem.fit(fitted.effects, start) for start in starts]
+
+    for fitted in (one for fits in in_threads(again, simpler) for one in fits):
+        beam.add(fitted)
+    beam.recount()
+
+
+def _numbers(fitted: Fit) -> int:
+    """Return how many parameters a set's effects have."""
+    return sum(len(effect.free) for effect in fitted.effects)
 
 
 def _part_of(beam: Beam, law: Effect) -> Fit | None:
@@ -467,6 +499,9 @@ def _go_on(beam: Beam, begun: Sequence[Begun]) -> None:
 
     for fit in in_threads(go_on, begun):
         beam.add(fit)
+        names = names_of(fit.effects)
+        if beam.fits[names] is fit:
+            beam.finished.discard(names)
     beam.recount()
 
 
