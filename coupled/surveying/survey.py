@@ -22,7 +22,7 @@ from coupled.files import read_bytes
 from coupled.flight.aircraft import make_aircraft
 from coupled.flight.airframe import packaged_models
 from coupled.flight.direct import check_direct_controls
-from coupled.flight.modelfile import UnreadableModelError, parsed
+from coupled.flight.modeltext import UnreadableModelError, parsed
 from coupled.record.channels import CONTROL_NAMES, PITCH, ROLL, ControlName
 from coupled.resources import aircraft_folder, shipped_rigs
 from coupled.rig.parameters import Flight
