@@ -104,6 +104,7 @@ def bending(rig: Rig, control: str | None = None, asked_as: str = "control") -> 
     Raises InputError, which names the control `asked_as`, where the rig lacks it, or none bends.
     """
     file = rig.file or Path(rig.name)
+    rig.check_controlled(file)
     names = [name for name in rig.controls if control in (None, name)]
     if not names:
         problem = f"no {control!r}; {nearest(str(control), rig.controls)}"
