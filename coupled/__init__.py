@@ -12,6 +12,7 @@ Load
     load_rig        a rig file, or a shipped rig by name: `Rig`
     new_rig         a first rig for a JSBSim aircraft; `rig.save` writes it
     models          JSBSim's aircraft: where each trims, how its controls move
+    terms           the named functions of an aircraft's aerodynamics, with their shares
     load_run        a run file, or a shipped run by name: a `Manoeuvre` each case
     read_record     a record of CSV or Parquet: `Record`
     write_record    the reverse, with a manifest
@@ -70,7 +71,7 @@ if TYPE_CHECKING:
     from coupled.api.flights import compare, fly, load_run
     from coupled.api.gaps import diagnose, fit
     from coupled.api.records import import_log, read_record, write_record
-    from coupled.api.rigs import load_rig, models, new_rig
+    from coupled.api.rigs import load_rig, models, new_rig, terms
     from coupled.calibration.calibrate import calibrate
     from coupled.calibration.calibrated import with_calibration
     from coupled.campaign.check import check
@@ -125,6 +126,7 @@ __all__ = [
     "read_record",
     "stability",
     "sweep",
+    "terms",
     "with_calibration",
     "write_record",
 ]
@@ -137,7 +139,7 @@ _HOMES = {
     "coupled.api.flights": ("compare", "fly", "load_run"),
     "coupled.api.gaps": ("diagnose", "fit"),
     "coupled.api.records": ("import_log", "read_record", "write_record"),
-    "coupled.api.rigs": ("load_rig", "models", "new_rig"),
+    "coupled.api.rigs": ("load_rig", "models", "new_rig", "terms"),
     "coupled.calibration.calibrate": ("calibrate",),
     "coupled.calibration.calibrated": ("with_calibration",),
     "coupled.campaign.check": ("check",),

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from coupled.errors import InputError
 from coupled.flight.aircraft import make_aircraft
 from coupled.flight.airframe import JSBSimAirframe
+from coupled.flight.altered import STILL
 from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import CONFIGURATIONS, Configuration, configure
 from coupled.flight.runfile import read_run
@@ -225,7 +226,7 @@ def _elevator_per(rig: Rig, file: Path, speed: float) -> tuple[float, float, flo
 
 def _trimmed(rig: Rig, file: Path, speed: float) -> JSBSimAirframe:
     assert rig.flight is not None
-    level = {"calibrated_airspeed_m_per_s": speed, "flight_path_rad": 0.0, "gust_rms_m_per_s": 0.0}
+    level = {"calibrated_airspeed_m_per_s": speed, "flight_path_rad": 0.0, **STILL}
     flight = changed(rig.flight, level, file, "flight")
     return make_aircraft(
         flight, 1.0 / rig.frame_rate, list(rig.controls), [aircraft_folder()], file

@@ -103,7 +103,7 @@ def _check_flight(control: ControlName, manoeuvre: Manoeuvre) -> None:
         problem = f"latency needs a force on the {control} that the rig does not change"
         raise UnjudgedError(f"{problem}: step, ramp, doublet, 3211, sweep or table")
     flight = manoeuvre.rig.flight
-    if manoeuvre.conditions != Conditions() or (flight is not None and flight.gust_rms > 0.0):
+    if manoeuvre.conditions != Conditions() or (flight is not None and not flight.still):
         raise UnjudgedError("latency is measured in still air and without events")
 
 

@@ -18,12 +18,13 @@ from coupled.cli.progress import progress
 from coupled.cli.rigs import ControlOption
 from coupled.cli.tables.whole import print_whole
 from coupled.cli.terminal import check_json, give_json, out, say
-from coupled.display import System, in_system
-from coupled.errors import InputError, nearest, shown
+from coupled.display import System, in_system, percent
+from coupled.errors import InputError, shown
 from coupled.record.channels import TIME, ControlName, control_named
 
 if TYPE_CHECKING:
     from coupled.record.record import Record
+    from coupled.rig.parameters import Flight
     from coupled.surveying.fromlog import LogNumbers
     from coupled.surveying.survey import Surveyed
 
@@ -54,6 +55,42 @@ def models(
     give_json(found.as_dict(), json_file)
 
 
+@app.command(epilog="[dim]Examples: coupled terms c172p · coupled terms T37 --run pull-up-t37[/]")
+def terms(
+    model: Annotated[
+        str, typer.Argument(help="A JSBSim model that is here, or the folder of another.")
+    ],
+    run: Annotated[
+        str,
+        typer.Option(
+            help="The run whose first case is flown. (default: a doublet and a 3-2-1-1 on each"
+            " surface)"
+        ),
+    ] = "",
+    json_file: JsonOption = "",
+) -> None:
+    """List the named functions of a model's aerodynamics, with axis and share of it in a flight.
+
+    A rig scales them by name in [flight.terms].
+    """
+    from coupled.surveying.terms import list_terms
+
+    check_json(json_file, [])
+    with progress() as advance:
+        found = list_terms(model, run or None, advance)
+    if json_file != "-":
+        table = Table("term", "axis", "share", box=None, pad_edge=False)
+        for one in found:
+            table.add_row(one.term, one.axis, "" if one.share is None else percent(one.share))
+        print_whole(out, table)
+        say(f"shares in {found.flown}, {_place(found.flight)}")
+    give_json(found.as_dict(), json_file)
+
+
+def _place(flight: Flight) -> str:
+    return f"from {flight.calibrated_airspeed:g} m/s, {flight.altitude:g} m"
+
+
 def _print(rows: Sequence[Surveyed]) -> None:
     table = Table("model", "trims at", "controls", "rigs", box=None, pad_edge=False)
     for row in rows:
@@ -75,6 +112,7 @@ def _print(rows: Sequence[Surveyed]) -> None:
     epilog="[dim]Examples:\n\n"
     "coupled new rig DHC6\n\n"
     "coupled new rig path/to/mymodel my-rig.toml\n\n"
+    "coupled new rig DHC6 airframe.toml --airframe-only\n\n"
     "coupled new rig --bench yoke.toml\n\n"
     "coupled new rig --bench yoke.toml --set travel=4in --set gradient=12lbf/in --set servo=no\n\n"
     "coupled new rig --from log.csv yoke.toml --units us[/]"
@@ -111,6 +149,9 @@ def rig(
         ),
     ] = None,
     control: ControlOption = "column",
+    airframe_only: Annotated[
+        bool, typer.Option("--airframe-only", help="The aircraft alone, without a control.")
+    ] = False,
     units: UnitsOption = "si",
 ) -> None:
     """Write a first rig: for a JSBSim model, or of a control on the bench. Guesses are listed."""
@@ -118,6 +159,8 @@ def rig(
         if file is not None:
             problem = "give the new rig's file alone: a bench has no model"
             raise InputError("new rig", str(file), problem)
+        if airframe_only:
+            raise InputError("new rig", "--airframe-only", "a bench has no aircraft")
         path = Path(model or "my-rig.toml")
         _bench(path, (log, map_file), given or [], control_named(control, "new rig"), units)
         return
@@ -127,7 +170,7 @@ def rig(
         used = "--set" if given else "--map" if map_file else "--control"
         used = "--units" if units != "si" and used == "--control" and control == "column" else used
         raise InputError("new rig", used, "goes with --bench or --from")
-    _for_model(model, file)
+    _for_model(model, file, airframe_only)
 
 
 def _bench(
@@ -224,35 +267,19 @@ def _print_found(found: LogNumbers, control: ControlName, units: System) -> None
     print_whole(out, table)
 
 
-def _for_model(model: str, file: Path | None) -> None:
-    """Write a first rig for a JSBSim model: its trim is computed, its loader guessed."""
+def _for_model(model: str, file: Path | None, airframe_only: bool) -> None:
+    """Write a first rig for a JSBSim model: where it trims, found; its loader, guessed."""
     from coupled.surveying.draft import draft
-    from coupled.surveying.survey import survey
+    from coupled.surveying.survey import model_given, surveyed
 
-    name, home, own = _model(model)
+    name, home, known = model_given(model)
     path = file or Path(f"{name}.toml")
     check_new(path, ".toml")
     with progress() as advance:
         advance(f"where {name} trims", 0, 1)
-        found = survey(name, home, speeds=True)
-    if found.flight is None:
-        raise InputError(model, "", f"does not trim wherever it was tried: {found.why}")
-    if not found.controls:
-        raise InputError(model, "", f"has no control that a rig could move: {found.lacking[0]}")
-    folder = os.path.relpath(home, path.resolve().parent) if own else ""
-    text = draft(found, path.stem, folder)
-    write_new(path, text, ".toml", f"coupled new run --rig {path}, and coupled compare")
-
-
-def _model(word: str) -> tuple[str, Path, bool]:
-    """Return a model's name, the folder of a user's own model, and whether it is unknown."""
-    from coupled.surveying.survey import known_models
-
-    known = known_models()
-    if word in known:
-        return word, known[word], False
-    folder = Path(word)
-    if ("/" in word or folder.is_dir()) and (folder / f"{folder.resolve().name}.xml").is_file():
-        return folder.resolve().name, folder.resolve().parent, True
-    problem = f"is no JSBSim model and no folder of one (NAME/NAME.xml); {nearest(word, known)}"
-    raise InputError(word, "", problem)
+        found = surveyed(model, name, home, airframe_only)
+    folder = "" if known else os.path.relpath(home, path.resolve().parent)
+    text = draft(found, path.stem, folder, airframe_only)
+    then = f"coupled new run --rig {path}, and coupled compare"
+    then = f"coupled terms {model}" if airframe_only else then
+    write_new(path, text, ".toml", then)

@@ -10,7 +10,7 @@ PANELS = {
     "Fly": ("runs", "compare", "fly", "check", "sweep", "plot", "live"),
     "Your loader": ("bench", "calibrate", "document", "map", "stability"),
     "Simulation and record": ("import", "diagnose", "fit", "blind"),
-    "Your aircraft": ("models", "new", "export"),
+    "Your aircraft": ("models", "terms", "new", "export"),
 }
 
 

@@ -58,6 +58,7 @@ def rig_and_control(name: str, control: str) -> tuple[Path, Rig, ControlName]:
 
     file = find(name, shipped_rigs(), "rig")
     rig = read_rig(file)
+    rig.check_controlled(file)
     for known in CONTROL_NAMES:
         if known == control and known in rig.controls:
             return file, rig, known

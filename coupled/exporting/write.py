@@ -104,6 +104,7 @@ def export(
     script is flown by JSBSim alone and compared with our own flight. Raises InputError with the key
     for parts that cannot be exported.
     """
+    rig.check_controlled(file)
     left = check_keys(rig, file)
     scripted = is_scripted(rig)
     substeps = math.ceil(rate_Hz / step_rate(rig) - 1e-9)

@@ -37,13 +37,9 @@ from coupled.flight.everyframe import (
     stepper,
 )
 from coupled.flight.gusts import GUST_DOWN
-from coupled.flight.modelfile import (
-    NothingToScaleError,
-    UnreadableModelError,
-    catalogue,
-    loadable,
-    models_in,
-)
+from coupled.flight.modelfile import catalogue, loadable, models_in
+from coupled.flight.modelparts import NothingToScaleError
+from coupled.flight.modeltext import UnreadableModelError
 from coupled.flight.newton import newton_trim
 from coupled.flight.putback import put_back
 from coupled.flight.surfacemap import flown_through, stops_found
@@ -163,14 +159,13 @@ class JSBSimAirframe:
         fdm.set_dt(frame_s)  # before loading, for the model's rate limits
         _log.text = ""
         scaled = [part for wrapper in wrappers for part in wrapper.scaled]
-        ballast = any(wrapper.ballast for wrapper in wrappers)
+        ballasts = sum(wrapper.ballasts for wrapper in wrappers)
         try:
-            with loadable(known[name], name, scaled, ballast) as folder:
+            with loadable(known[name], name, scaled, ballasts) as folder:
                 fdm.set_aircraft_path(str(folder))
                 loaded = fdm.load_model(name)
         except NothingToScaleError as error:
-            problem = f"{name} has no {error.scaled.quantity} that could be scaled; leave it at 1"
-            raise self.fault(error.scaled.name, problem) from None
+            raise self.fault(error.name, f"{name} has {error.lacking}") from None
         except UnreadableModelError as error:
             raise self.fault("model", f"{name} does not load: {error}") from None
         except RecursionError:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.errors import InputError
+from coupled.flight.everyframe import TRIMS
 from coupled.flight.wrapper import Aircraft, Hook, Wrapper
 from coupled.record.channels import SURFACES, ControlName
 from coupled.rig.control import ControlArray
@@ -20,7 +21,6 @@ from coupled.rig.serving import service_command, set_service
 from coupled.schema import Section, named, quantity
 
 Move = Callable[[float], None]  # to a share of the whole, from 0 to 1
-_TRIMS = {"column": "pitch", "wheel": "roll", "pedals": "yaw"}
 # Fuel cut and magnetos off, for the engine selected in JSBSim; −1 selects all.
 OFF = {"propulsion/cutoff_cmd": 1.0, "propulsion/magneto_cmd": 0.0}
 PICK = "propulsion/active_engine"
@@ -136,8 +136,7 @@ def _trim(aircraft: Aircraft, event: Event, file: object, place: str) -> Move | 
     """Return a function that moves the trim by a share of the surface's travel; shifts add up."""
     if event.trim is None or event.by is None:
         return None
-    name = f"fcs/{_TRIMS[event.trim]}-trim-cmd-norm"
-    lever = aircraft.lever(name, file, f"{place}.trim")
+    lever = aircraft.lever(TRIMS[event.trim], file, f"{place}.trim")
     whole, before = COMMAND_SIGN[SURFACES[event.trim]] * event.by, 0.0
 
     def move(share: float) -> None:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
-from coupled.record.channels import LATERAL, LONGITUDINAL
+from coupled.record.channels import LATERAL, LONGITUDINAL, ControlName
 from coupled.rig.placed import Placed
 from coupled.units import FOOT_m, PSF_Pa
 
@@ -37,6 +37,13 @@ _LONGITUDINAL = len(LONGITUDINAL)
 PROPERTIES = dict(
     zip(LONGITUDINAL + LATERAL, LONGITUDINAL_PROPERTIES + LATERAL_PROPERTIES, strict=True)
 )
+
+# JSBSim's trim of each control's surface, in its commands.
+TRIMS: Mapping[ControlName, str] = {
+    "column": "fcs/pitch-trim-cmd-norm",
+    "wheel": "fcs/roll-trim-cmd-norm",
+    "pedals": "fcs/yaw-trim-cmd-norm",
+}
 
 
 class Lever(NamedTuple):

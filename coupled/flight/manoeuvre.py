@@ -210,6 +210,7 @@ class Manoeuvre:
         bench.check(file)
 
     def _check_pilots(self) -> None:
+        self.rig.check_controlled(self.rig_file)
         if not self.pilots:
             controls = ", ".join(self.rig.controls)
             raise InputError(self.file, "pilot", f"needs at least one of {controls}")

@@ -15,6 +15,7 @@ from coupled.rig.equations import uncompensated_loss
 from coupled.rig.parameters import Control
 from coupled.rig.rig import Rig
 from coupled.surveying.survey import Surveyed
+from coupled.surveying.terms import ModelTerms
 from coupled.surveying.whole import Survey
 
 _SHOWN = "G_T over q̄, and the share that the bend takes where the host corrects nothing."
@@ -28,10 +29,8 @@ def rig_report(rig: Rig, made: Made) -> Report:
         heads,
         tuple((rows[0][0], *(value for _, value in rows)) for rows in zip(*columns, strict=True)),
     )
-    sections = (
-        Section("Controls", (table,)),
-        Section("Gradients", (Drawing(svg_text(draw_rig(rig)), _SHOWN),)),
-    )
+    drawn = (Drawing(svg_text(draw_rig(rig)), _SHOWN),) if rig.controls else ()
+    sections = (Section("Controls", (table,)), Section("Gradients", drawn)) if drawn else ()
     aircraft = "none" if rig.flight is None else rig.flight.model
     settings = (
         ("rig", rig.name),
@@ -73,6 +72,18 @@ def survey_report(found: Survey, made: Made) -> Report:
     said = f"{len(trimmed)} of {len(found)} trim, {led} can be flown by a rig."
     settings = (("models", str(len(found))),)
     return Report("Models", "JSBSim", Verdict(said), (Section("Models", (table,)),), settings, made)
+
+
+def terms_report(found: ModelTerms, made: Made) -> Report:
+    """Return the report of a model's terms: a row each."""
+    rows = tuple(
+        (one.term, one.axis, "" if one.share is None else percent(one.share)) for one in found
+    )
+    table = Table(("term", "axis", "share"), rows, words=2)
+    said = f"{len(found)} named functions; shares in {found.flown}."
+    settings = (("model", found.model),)
+    section = Section("Terms", (table,))
+    return Report("Terms", found.model, Verdict(said), (section,), settings, made)
 
 
 def _surveyed(one: Surveyed) -> tuple[str | Mark, ...]:

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
+from pydantic import Field
+
 from coupled.schema import Section, named, quantity, text_like
 
 # A name usable in a file name: letters, digits, dot, dash, underscore.
@@ -273,13 +275,33 @@ class Flight(Section):
     landing: bool = False
     steps_per_frame: int = quantity("", 1, ge=1, le=100)
     elevator_effectiveness: float = quantity("", 1.0, ge=0, le=10)
+    aileron_effectiveness: float = quantity("", 1.0, ge=0, le=10)
+    rudder_effectiveness: float = quantity("", 1.0, ge=0, le=10)
     pitch_damping: float = quantity("", 1.0, ge=0, le=10)
+    roll_damping: float = quantity("", 1.0, ge=0, le=10)
+    yaw_damping: float = quantity("", 1.0, ge=0, le=10)
     pitch_stiffness: float = quantity("", 1.0, ge=0, le=10)
+    dihedral_effect: float = quantity("", 1.0, ge=0, le=10)
+    directional_stability: float = quantity("", 1.0, ge=0, le=10)
+    adverse_yaw: float = quantity("", 1.0, ge=0, le=10)
     lift_slope: float = quantity("", 1.0, ge=0, le=10)
+    side_force_slope: float = quantity("", 1.0, ge=0, le=10)
+    drag: float = quantity("", 1.0, ge=0, le=10)
+    thrust: float = quantity("", 1.0, ge=0, le=10)
     mass: float = quantity("", 1.0, gt=0, le=10)
+    roll_inertia: float = quantity("", 1.0, gt=0, le=10)
+    pitch_inertia: float = quantity("", 1.0, gt=0, le=10)
+    yaw_inertia: float = quantity("", 1.0, gt=0, le=10)
     cg_aft: float = quantity("m", 0.0, ge=-5, le=5)
     fuel: float = quantity("", 1.0, ge=0, le=100)
     motion_stamp: float = quantity("s", 0.0, ge=-0.5, le=0.5)
     gust_rms: float = quantity("m_per_s", 0.0, ge=0, le=30)
+    lateral_gust_rms: float = quantity("m_per_s", 0.0, ge=0, le=30)
     gust_length: float = quantity("m", 150.0, gt=0)
     properties: dict[str, float] = {}
+    terms: dict[str, Annotated[float, Field(ge=0, le=10)]] = {}
+
+    @property
+    def still(self) -> bool:
+        """Whether the rig has no gusts."""
+        return self.gust_rms == self.lateral_gust_rms == 0.0

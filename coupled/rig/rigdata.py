@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from coupled.errors import InputError
 from coupled.record.channels import ControlName
 from coupled.rig.parameters import Control, Flight, PlainName
 from coupled.rig.structure import Structure
@@ -18,3 +19,9 @@ class RigData(Section):
     flight: Flight | None = None
     noise: dict[str, float] = {}
     structure: Structure = Structure()
+
+    def check_controlled(self, file: object = None) -> None:
+        """Refuse a rig without a control; `file` is named in the fault, by default the rig."""
+        if not self.controls:
+            problem = "the rig has an aircraft only; give a rig with a control ([controls.column])"
+            raise InputError(file or self.name, "controls", problem)

@@ -22,7 +22,7 @@ from coupled.files import read_bytes
 from coupled.flight.aircraft import make_aircraft
 from coupled.flight.airframe import packaged_models
 from coupled.flight.direct import check_direct_controls
-from coupled.flight.modelfile import UnreadableModelError, parsed
+from coupled.flight.modeltext import UnreadableModelError, parsed
 from coupled.record.channels import CONTROL_NAMES, PITCH, ROLL, ControlName
 from coupled.resources import aircraft_folder, shipped_rigs
 from coupled.rig.parameters import Flight
@@ -87,6 +87,26 @@ def known_models() -> dict[str, Path]:
     return dict(sorted({**packaged_models(), **ours}.items(), key=lambda one: one[0].lower()))
 
 
+def model_given(word: str) -> tuple[str, Path, bool]:
+    """Return a model's name, the folder of all models in which it lies, and whether it is known.
+
+    `word` is the name of a model that is here, or the folder of another (NAME/NAME.xml). Raises
+    InputError for any other.
+    """
+    known, folder = known_models(), Path(word)
+    if word in known:
+        return word, known[word], True
+    try:
+        own = folder.resolve()
+        there = (own / f"{own.name}.xml").is_file()
+    except (OSError, ValueError):  # a name that no folder can have
+        there = False
+    if not there:
+        problem = f"is no JSBSim model and no folder of one (NAME/NAME.xml); {nearest(word, known)}"
+        raise InputError(word, "", problem)
+    return own.name, own.parent, False
+
+
 def chosen_models(names: Sequence[str], asked_by: str = "coupled.surveying") -> dict[str, Path]:
     """Return some models, or all that are here, as `known_models` does.
 
@@ -142,6 +162,19 @@ def survey(model: str, home: Path, *, speeds: bool = False) -> Surveyed:
         *(model, flight, holds, "", controls, direct, lacking),
         *(slowest, fastest, mass, rigs),
     )
+
+
+def surveyed(word: str, model: str, home: Path, airframe_only: bool = False) -> Surveyed:
+    """Return what is found of a model for a first rig; `word` names it in faults.
+
+    Raises InputError if it does not trim or, unless `airframe_only`, has no control for a rig.
+    """
+    found = survey(model, home, speeds=not airframe_only)
+    if found.flight is None:
+        raise InputError(word, "", f"does not trim wherever it was tried: {found.why}")
+    if not found.controls and not airframe_only:
+        raise InputError(word, "", f"has no control that a rig could move: {found.lacking[0]}")
+    return found
 
 
 def _tries(model: str, home: Path) -> Iterator[Flight]:

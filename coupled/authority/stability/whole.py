@@ -106,6 +106,7 @@ def compliant_controls(
     Raises InputError, which names the control `key`, where the rig lacks it, or none bends.
     """
     file = rig.file or Path(rig.name)
+    rig.check_controlled(file)
     names = [name for name in rig.controls if control in (None, name)]
     if not names:
         problem = f"no {control!r}; {nearest(str(control), rig.controls)}"
