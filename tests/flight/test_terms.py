@@ -77,6 +77,16 @@ def test_a_wrong_term_is_refused_with_the_nearest_name(tmp_path: Path) -> None:
         "my.toml: flight.terms.aero/coefficient/ClP_: c172p has no aerodynamic function"
         " 'aero/coefficient/ClP_'; did you mean aero/coefficient/Clp?"
     )
+    with pytest.raises(InputError, match="did you mean"):
+        make_aircraft(flight({"aero/coefficient/ClP_": 1.0}), FRAME)
+    with pytest.raises(InputError, match=r"vary\[0\]: rig\.flight\.terms\.Clx = 0\.7: T37 has no"):
+        coupled.sweep(
+            {
+                "name": "wrong",
+                "run": "pull-up-t37",
+                "vary": [{"key": "rig.flight.terms.Clx", "values": [0.7, 1.0]}],
+            }
+        )
     with pytest.raises(InputError, match=r"flight\.terms\.a: .*less than or equal to 10"):
         flight({"a": 11.0})
 
