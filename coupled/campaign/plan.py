@@ -31,6 +31,9 @@ from coupled.resources import find_named, shipped_runs
 from coupled.rig.rigfile import change
 from coupled.schema import load_toml
 
+# Tables whose keys are names in the aircraft's model.
+_OF_MODEL = ("flight.properties.", "flight.terms.")
+
 
 @dataclass(frozen=True)
 class PlannedFlight:
@@ -162,8 +165,8 @@ def _check_keys(
         for value in values:
             try:
                 scenario = try_changes(dict.fromkeys((vary.key, *vary.also), value))
-                if value is values[0] and "flight.properties." in vary.key:
-                    _check_property(scenario, vary.key)
+                if value is values[0] and any(table in vary.key for table in _OF_MODEL):
+                    _check_name(scenario, vary.key)
             except InputError as error:
                 faults.append(_blamed(vary, i, value, error, file, try_changes))
                 break
@@ -197,8 +200,8 @@ def _blamed(
     return InputError(file, place, f"{key} = {value!r}: {named}{error.problem}")
 
 
-def _check_property(scenario: Manoeuvre, key: str) -> None:
-    """Refuse a property that the aircraft lacks; a failure to trim is a row of the table."""
+def _check_name(scenario: Manoeuvre, key: str) -> None:
+    """Refuse a name that the aircraft's model lacks; a failure to trim is a row of the table."""
     try:
         make_airframe(scenario)
     except InputError as error:

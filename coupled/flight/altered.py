@@ -110,14 +110,17 @@ class Altered(NamedTuple):
 
 
 def alterations(flight: Flight) -> list[Altered]:
-    """Return a rig's alterations whose factors are not 1, in the order in which they are made."""
+    """Return a rig's terms, and its alterations whose factors are not 1, in order.
+
+    A term is made at a factor of 1 as well, so that a wrong name is refused.
+    """
     terms = [Altered(Term(name), factor, None) for name, factor in flight.terms.items()]
     others = [Altered(a.part, getattr(flight, a.part.name), a.about_trim) for a in ALTERATIONS]
-    return [each for each in (*terms, *others) if each.factor != 1.0]
+    return [*terms, *(each for each in others if each.factor != 1.0)]
 
 
 class Alterations(Wrapper):
-    """The factors of a rig that are not 1.
+    """The terms and the factors of a rig.
 
     `make_plain` makes a plain aircraft like this one, led by a control, which reads given
     properties: if the trim is moved in flight, it gives the surface position of the trim alone.

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
+import jsbsim
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -15,10 +17,15 @@ import coupled
 from coupled.errors import InputError
 from coupled.flight.aircraft import make_aircraft, make_unchecked
 from coupled.flight.airframe import JSBSimAirframe, packaged_models
+from coupled.flight.altered import ALTERATIONS
 from coupled.flight.loop import fly
+from coupled.flight.modelfile import loadable
+from coupled.flight.modelparts import NothingToScaleError, Part, Term
+from coupled.flight.modeltext import functions_of
 from coupled.flight.runfile import read_run
 from coupled.rig.parameters import Flight
 from coupled.schema import build
+from coupled.surveying.survey import known_models
 from tests.support.commands import coupled as command
 from tests.support.models import edited_model, multiplied
 
@@ -70,6 +77,16 @@ def test_a_wrong_term_is_refused_with_the_nearest_name(tmp_path: Path) -> None:
         "my.toml: flight.terms.aero/coefficient/ClP_: c172p has no aerodynamic function"
         " 'aero/coefficient/ClP_'; did you mean aero/coefficient/Clp?"
     )
+    with pytest.raises(InputError, match="did you mean"):
+        make_aircraft(flight({"aero/coefficient/ClP_": 1.0}), FRAME)
+    with pytest.raises(InputError, match=r"vary\[0\]: rig\.flight\.terms\.Clx = 0\.7: T37 has no"):
+        coupled.sweep(
+            {
+                "name": "wrong",
+                "run": "pull-up-t37",
+                "vary": [{"key": "rig.flight.terms.Clx", "values": [0.7, 1.0]}],
+            }
+        )
     with pytest.raises(InputError, match=r"flight\.terms\.a: .*less than or equal to 10"):
         flight({"a": 11.0})
 
@@ -138,3 +155,23 @@ def test_wrong_requests_are_refused(tmp_path: Path, words: tuple[str, ...], said
     assert done.returncode == 2
     assert said in done.stderr
     assert done.stderr.count("\n") == 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("model", sorted(set(known_models()) - {"blank"}))
+def test_every_model_loads_with_all_its_parts_and_terms_scalable(model: str) -> None:
+    """A term that JSBSim shows no property of has no share; ballx alone has one."""
+    home, parts = known_models()[model], list[Part]()
+    functions = functions_of(home, model)
+    for part in (*map(Term, functions), *(alteration.part for alteration in ALTERATIONS)):
+        with suppress(NothingToScaleError), loadable(home, model, [part]):
+            parts.append(part)
+    assert len(parts) > len(functions)
+    fdm = jsbsim.FGFDMExec(jsbsim.get_default_root_dir())
+    fdm.set_dt(FRAME)
+    with loadable(home, model, parts, 8) as folder:
+        fdm.set_aircraft_path(str(folder))
+        assert fdm.load_model(model)
+    known = {line.rpartition(" (")[0] for line in fdm.query_property_catalog("").split("\n")}
+    assert {name for part in parts for name in part.settings(1.0)} <= known
+    assert set(functions) - known <= {"aero/dummy1"}
