@@ -6,6 +6,7 @@ import pickle
 import resource
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -429,3 +430,44 @@ def test_a_law_that_returns_no_gradient_is_one_line(value: Any, said: str) -> No
 def test_one_law_for_three_controls_is_refused() -> None:
     with pytest.raises(coupled.InputError, match="gradient: is one law for 3 controls; give a tab"):
         coupled.fly(RIG, column=damp, duration_s=0.5, gradient=law)
+
+
+def test_a_check_takes_a_function_in_place_of_the_run_s_pilot() -> None:
+    """Of a pilot that leaves the column alone, the run's expectations do not hold."""
+    assert coupled.check("appendix-c").passed
+    assert not coupled.check("appendix-c", column=nothing).passed
+
+
+def nothing(state: coupled.State) -> float:
+    return 0.0
+
+
+def steady(state: coupled.State) -> float:
+    return 30.0 if state.time_s > 0.2 else 0.0
+
+
+SWEEP: dict[str, Any] = {
+    "name": "own",
+    "run": "appendix-c",
+    "configurations": ["uncompensated"],
+    "keep": ["force_N"],
+    "vary": [{"key": "rig.controls.column.loader.bend_m_per_N", "values": [1e-5, 9e-5]}],
+}
+
+
+def test_a_sweep_takes_a_function_that_can_be_pickled(tmp_path: Path) -> None:
+    found = coupled.sweep(SWEEP, tmp_path / "own", workers=1, column=steady).to_polars()
+    assert found["force_N"].to_list() == [30.0, 30.0]
+    with pytest.raises(coupled.InputError, match="another sweep"):
+        coupled.sweep(SWEEP, tmp_path / "own", workers=1, column=nothing)
+    said = "column: .*<lambda>.* cannot be pickled for other processes; define it, by its name, at"
+    with pytest.raises(coupled.InputError, match=said):
+        coupled.sweep(SWEEP, workers=1, column=lambda state: 1.0)
+    with pytest.raises(coupled.InputError, match="the rig has no wheel"):
+        coupled.sweep(SWEEP, workers=1, wheel=steady)
+
+
+@pytest.mark.slow
+def test_a_sweep_s_workers_fly_the_same_function() -> None:
+    one, two = (coupled.sweep(SWEEP, workers=n, column=steady).to_polars() for n in (1, 2))
+    assert one.equals(two)

@@ -6,14 +6,15 @@ with a state of its own may have a function `reset`, which is called at the star
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import pickle
+from collections.abc import Callable, Mapping
 from numbers import Real
 from typing import TYPE_CHECKING, Any, Literal
 
 from coupled.errors import InputError, shown, shown_value
 from coupled.flight.pilot.base import STRONGEST, Action, Pilot, Start
 from coupled.flight.state import State, time_of
-from coupled.record.channels import ControlName, unit_of
+from coupled.record.channels import CONTROL_NAMES, ControlName, unit_of
 from coupled.rig.rig import Rig
 
 Law = Callable[[State], float]
@@ -52,6 +53,29 @@ def as_pilot(given: Any) -> Any:
     if isinstance(given, (Pilot, type)) or not callable(given):
         return given  # a manoeuvre refuses what is no pilot
     return OwnPilot(law=given)
+
+
+def given_laws(
+    column: Law | None, wheel: Law | None, pedals: Law | None, file: object
+) -> dict[ControlName, Pilot]:
+    """Return the pilots of functions, by their controls; raises InputError for what is none."""
+    found: dict[ControlName, Pilot] = {}
+    for control, law in zip(CONTROL_NAMES, (column, wheel, pedals), strict=True):
+        if law is not None:
+            check_law(law, file, control)
+            found[control] = OwnPilot(law=law)
+    return found
+
+
+def check_pickled(pilots: Mapping[ControlName, Pilot], file: object) -> None:
+    """Raise InputError for a function that other processes cannot be given."""
+    for control, pilot in pilots.items():
+        try:
+            pickle.dumps(pilot)
+        except (pickle.PicklingError, AttributeError, TypeError):
+            problem = f"{pilot.title} cannot be pickled for other processes; define it, by its"
+            problem += " name, at the top level of a module"
+            raise InputError(file, control, problem) from None
 
 
 def name_of(law: object) -> str:
