@@ -73,6 +73,7 @@ ORDER += [
     "plots",
     "reports",
     "api",
+    "envs",
     "live",
     "pytest_plugin",
     "cli/tables",
