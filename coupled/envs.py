@@ -129,7 +129,7 @@ class LoaderEnv(gymnasium.Env[Floats, Floats]):
         """
         try:
             share = np.asarray(action, dtype=np.float64)
-        except (TypeError, ValueError):  # no numbers
+        except (TypeError, ValueError, OverflowError):  # no numbers
             share = np.zeros(0)
         if share.shape != (len(self._controls),) or not np.all(np.abs(share) <= 1.0):
             problem = f"is {action!r:.60}; give {len(self._controls)} from -1 to 1"

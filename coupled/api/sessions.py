@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, replace
 from functools import partial
 from numbers import Real
-from typing import Unpack
+from typing import Any, Unpack
 
 from coupled.api.flights import Gradients, Path, Terms, manoeuvre_of, pilots_of
 from coupled.arguments import checks_itself, public
@@ -105,7 +105,7 @@ class Session:
         self._places, data = flight.places(), flight.data
         # The rows' bytes, if the record has no channels beside them.
         plain = len(self._places) == data.shape[1]
-        self._rows = memoryview(data).cast("B") if plain else None
+        self._rows = memoryview(data.data).cast("B") if plain else None
         self._row_bytes = data.strides[0]
 
     def _look(self) -> None:
@@ -315,7 +315,7 @@ class Session:
             raise InputError(_NAME, what, self._refusal)
 
 
-def _checked_force(name: str, force: object) -> float:
+def _checked_force(name: str, force: Any) -> float:
     """Return a force of any number's type as a float, N; raises InputError for what is none."""
     number = isinstance(force, Real) and not isinstance(force, bool)
     if not number or not -STRONGEST <= force <= STRONGEST:

@@ -53,7 +53,8 @@ class Served:
 
     def row(self, k: int) -> Floats:
         """Return the services' channels of frame k, in the order of `channels`."""
-        return self._rows[k].ravel()
+        row: Floats = self._rows[k].ravel()
+        return row
 
     @property
     def channels(self) -> tuple[str, ...]:

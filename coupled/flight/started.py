@@ -64,6 +64,8 @@ class StartedFlight:
         self._noise = ChannelNoise(self._own_channels, rig.noise, manoeuvre.seed)
         self.data = np.zeros((0, len(self._own_channels)))
         self._hiss = self.data if lateness(rig) else None
+        self._script: Floats
+        self.frames: Frames
         for law in (*self._laws().values(), *self._own_pilots().values()):
             reset_law(law)
         self.extend(frames)

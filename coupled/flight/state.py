@@ -26,7 +26,7 @@ class State:
     >>> with coupled.Session("t37") as session:
     ...     state = session.state
     >>> round(state.altitude_m), state["time_s"], len(state)
-    (1524, 0.0, 46)
+    (1500, 0.0, 46)
     """
 
     __slots__ = ("_places", "_values")

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import coupled
-from coupled.api import sessions
+from coupled.flight import loop
 from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import EVERY_CONFIGURATION
 from coupled.flight.runfile import read_run
@@ -21,16 +21,20 @@ from coupled.rig.placed import HalfFrames
 
 RIG = coupled.load_rig("t37")
 COLUMN = coupled.load_rig("report-column")
+KIND: Any = coupled.Step
 
 
 def wandering(seed: int, frames: int) -> list[float]:
     """Return a force for each frame, N, from a seed."""
-    return (40.0 * np.random.default_rng(seed).standard_normal(frames)).tolist()
+    rng = np.random.default_rng(seed)
+    return [40.0 * float(rng.standard_normal()) for _ in range(frames)]
 
 
 def held(forces: list[float], rig: coupled.Rig) -> coupled.ForceTable:
     """Return the table of forces that are each held over a frame, on the loader's nodes."""
-    nodes = np.arange(len(forces) * rig.substeps + 1) * (1.0 / (rig.frame_rate * rig.substeps))
+    nodes = np.arange(len(forces) * rig.substeps + 1, dtype=np.float64) * (
+        1.0 / (rig.frame_rate * rig.substeps)
+    )
     values = np.concatenate(([0.0], np.repeat(forces, rig.substeps)))
     return coupled.ForceTable(time_s=nodes, force_N=values)
 
@@ -107,7 +111,7 @@ def test_all_three_controls_are_pushed_by_their_names() -> None:
 
 
 def test_a_state_has_the_channels_of_the_record_and_is_frozen() -> None:
-    given = {"record_properties": ["fcs/throttle-pos-norm"], "event": JAM}
+    given: dict[str, Any] = {"record_properties": ["fcs/throttle-pos-norm"], "event": JAM}
     with coupled.Session("t37", **given) as session:
         states = [session.state, *(session.step(column_force_N=9.0) for _ in range(5))]
     record = session.record
@@ -221,8 +225,8 @@ def test_a_reset_keeps_the_aircraft_that_jsbsim_restores(monkeypatch: pytest.Mon
         made.append(manoeuvre.rig.name)
         return before(manoeuvre)
 
-    before = sessions.make_airframe
-    monkeypatch.setattr(sessions, "make_airframe", make)
+    before = loop.make_airframe
+    monkeypatch.setattr("coupled.api.sessions.make_airframe", make)
     with coupled.Session("t37") as session:
         for _ in range(3):
             session.step(column_force_N=50.0)
@@ -380,7 +384,7 @@ def test_an_exception_of_a_pilot_passes_with_its_place() -> None:
 
 def test_a_class_is_no_pilot() -> None:
     with pytest.raises(coupled.InputError, match=r"pilot.column: is <class .*; give a pilot"):
-        coupled.fly(COLUMN, column=coupled.Step, duration_s=0.5)
+        coupled.fly(COLUMN, column=KIND, duration_s=0.5)
 
 
 def law(state: coupled.State) -> float:
