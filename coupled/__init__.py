@@ -23,11 +23,13 @@ Fly
     compare         rigid, uncompensated, each correction, both: `.loss(…)`, `.to_polars()`
     check           runs held against what they expect
     sweep           a run over values of its parameters, to one table
+    Session         a flight stepped from outside: one frame, one `State`, for each `step`
 
 Pilots, on `column`, `wheel` or `pedals`
     Step Ramp Doublet ThreeTwoOneOne FrequencySweep ForceTable     a force over time
     Clamp                                                          a held deflection
     Attitude Track                                                 a closed loop
+    a function of the `State` that returns a force in N            your own
 
 Calibrate and diagnose
     plan            the readings to take; `bench` takes them at a simulated rig
@@ -72,6 +74,7 @@ if TYPE_CHECKING:
     from coupled.api.gaps import diagnose, fit
     from coupled.api.records import import_log, read_record, write_record
     from coupled.api.rigs import load_rig, models, new_rig, terms
+    from coupled.api.sessions import Session
     from coupled.calibration.calibrate import calibrate
     from coupled.calibration.calibrated import with_calibration
     from coupled.campaign.check import check
@@ -89,6 +92,7 @@ if TYPE_CHECKING:
         ThreeTwoOneOne,
         Track,
     )
+    from coupled.flight.state import State
     from coupled.record.record import Record
     from coupled.rig.rig import Rig
 
@@ -104,6 +108,8 @@ __all__ = [
     "Ramp",
     "Record",
     "Rig",
+    "Session",
+    "State",
     "Step",
     "ThreeTwoOneOne",
     "Track",
@@ -140,6 +146,7 @@ _HOMES = {
     "coupled.api.gaps": ("diagnose", "fit"),
     "coupled.api.records": ("import_log", "read_record", "write_record"),
     "coupled.api.rigs": ("load_rig", "models", "new_rig", "terms"),
+    "coupled.api.sessions": ("Session",),
     "coupled.calibration.calibrate": ("calibrate",),
     "coupled.calibration.calibrated": ("with_calibration",),
     "coupled.campaign.check": ("check",),
@@ -150,6 +157,7 @@ _HOMES = {
         *("Attitude", "Clamp", "Doublet", "ForceTable", "FrequencySweep"),
         *("Ramp", "Step", "ThreeTwoOneOne", "Track"),
     ),
+    "coupled.flight.state": ("State",),
     "coupled.record.record": ("Record",),
     "coupled.rig.rig": ("Rig",),
 }

@@ -72,6 +72,7 @@ ORDER += [
     "plots",
     "reports",
     "api",
+    "envs",
     "live",
     "pytest_plugin",
     "cli/tables",

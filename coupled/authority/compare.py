@@ -173,8 +173,8 @@ def judge(
         commands = average_commands(rig, control, record, held)
         felt, specified = average_forces(rig, control, record, held)
         stop = commands.stop
-        # The statics are those of a loader without services.
-        known = closed_forms and not manoeuvre.served
+        # The statics are those of the rig's own schedule, and of a loader without services.
+        known = closed_forms and not manoeuvre.served and not manoeuvre.gradient
         loss, ratio = predict_at_rest(rig, control, record, held, stop) if known else (nan, nan)
         asked, reached = commands.commanded, commands.reached
         # Where a service holds the control instead of the hand, no gradient is felt.

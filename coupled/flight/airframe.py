@@ -31,9 +31,11 @@ from coupled.flight.everyframe import (
     Lever,
     PlainAircraft,
     PlainFrames,
+    PlainSteps,
     Read,
     motion_reader,
     plain_frames,
+    plain_steps,
     stepper,
 )
 from coupled.flight.gusts import GUST_DOWN
@@ -46,7 +48,7 @@ from coupled.flight.surfacemap import flown_through, stops_found
 from coupled.flight.wrapper import Step, Wrapper, led_by
 from coupled.record.channels import ALTITUDE, LONGITUDINAL, SURFACES, motion_channels
 from coupled.rig.parameters import Flight
-from coupled.rig.placed import Placed
+from coupled.rig.placed import HalfFrames, Placed
 from coupled.units import FOOT_m, KNOT_m_per_s
 
 _COMMANDS = {name: f"fcs/{name}-cmd-norm" for name in SURFACES.values()}
@@ -311,6 +313,10 @@ class JSBSimAirframe:
     def plain_frames(self, placed: Placed) -> PlainFrames | None:
         """Return the fast loop of rig and aircraft; None if wrappers act on the aircraft."""
         return None if self._plain is None else plain_frames(self._plain, placed)
+
+    def plain_steps(self, halves: HalfFrames) -> PlainSteps | None:
+        """Return the fast halves of a frame of rig and aircraft; None if wrappers act on it."""
+        return None if self._plain is None else plain_steps(self._plain, halves)
 
     def extra(self) -> tuple[float, ...]:
         """Return the further properties, in JSBSim's units."""

@@ -24,10 +24,10 @@ from coupled.live.pacing import Pacer
 from coupled.live.rows import Rows, only_measured
 from coupled.live.safety import Limits
 from coupled.live.service import Adaptation, BendEstimator
-from coupled.live.switches import Switches
 from coupled.record.channels import FRESH, SWITCHED, channel
 from coupled.record.record import Record
 from coupled.rig.serving import check_service, service_command, services_of, set_service
+from coupled.rig.switches import Switches
 
 STOPPED = "stopped"
 SAVE_EVERY_s = 5.0  # writing a record takes processor time from the frames

@@ -96,7 +96,7 @@ def _settings(run: Manoeuvre) -> Iterable[tuple[str, str]]:
     yield "rig", rig.name
     yield "aircraft", rig.flight.model if rig.flight is not None else "none, on the bench"
     yield "control", run.control
-    pilots = (f"{type(p).__name__} on the {control}" for control, p in run.pilots.items())
+    pilots = (f"{p.title} on the {control}" for control, p in run.pilots.items())
     yield "pilot", ", ".join(pilots)
     yield "length of a flight", f"{run.duration_s:g} s"
     yield "frame rate", f"{rig.frame_rate:g} Hz, {rig.substeps} substeps of the rig a frame"

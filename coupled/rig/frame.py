@@ -242,6 +242,17 @@ def host_frames(
     return first_command, second_command, third_command
 
 
+@stage
+def run_loaders(controls: ControlArray, script: Floats, k: int, load_factor: float) -> None:
+    """Run hand, loader and linkage of all controls over frame k, after its host."""
+    if controls[0].parameters.crossing.joined != 0:
+        run_joined(controls, script, k, load_factor)
+        return
+    for i in range(len(controls)):
+        p, s = controls[i].parameters, controls[i].state
+        run_frame(p, s, script[i, 0], script[i, 1], k * p.clock.substeps, load_factor)
+
+
 @entry
 def step_frame(
     controls: ControlArray,
@@ -264,10 +275,5 @@ def step_frame(
         start_controls(controls, script)
     serve_frame(controls, motion, load_factor)
     commands = host_frames(controls, record[k], motion)
-    if controls[0].parameters.crossing.joined != 0:
-        run_joined(controls, script, k, load_factor)
-        return commands
-    for i in range(len(controls)):
-        p, s = controls[i].parameters, controls[i].state
-        run_frame(p, s, script[i, 0], script[i, 1], k * p.clock.substeps, load_factor)
+    run_loaders(controls, script, k, load_factor)
     return commands
