@@ -28,7 +28,7 @@ Element = ElementTree.Element
 
 
 class NothingToScaleError(Exception):
-    """A model lacks a part; `name` is the part's key, `lacking` what the model has not."""
+    """A model lacks a part; `name` is the part's key, `lacking` the missing thing and a remedy."""
 
     def __init__(self, name: str, lacking: str) -> None:
         super().__init__(lacking)
@@ -153,7 +153,7 @@ class Thrust:
     def make_scalable(self, model: ModelText) -> None:
         """Add external reactions: k − 1 times the engines' force and moment."""
         if model.section("propulsion") is None:
-            raise NothingToScaleError(self.name, _none_of("engine"))
+            raise NothingToScaleError(self.name, _none_of("thrust"))
         made = ElementTree.fromstring(_thrust_reactions(*self.settings(1.0)))
         reactions = model.section("external_reactions")
         if reactions is None:
