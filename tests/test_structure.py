@@ -70,6 +70,7 @@ ORDER += [
     "gap",
     "blind/twin",
     "blind/trials",
+    "tables",
     "plots",
     "reports",
     "api",
