@@ -26,7 +26,7 @@ _WIDE = 10.0  # greatest over least value of an axis that may be logarithmic
 
 def in_unit(found: pl.DataFrame, name: str, unit: Shown) -> pl.DataFrame:
     """Return a table with a column of numbers in a unit, NaN where it has no value."""
-    return found.with_columns(unit.factor * pl.col(name).cast(pl.Float64).fill_null(np.nan))
+    return found.with_columns(pl.col(name).cast(pl.Float64).fill_null(np.nan) * unit.factor)
 
 
 def varying(
