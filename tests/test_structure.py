@@ -69,6 +69,7 @@ ORDER += [
     "gap",
     "blind/twin",
     "blind/trials",
+    "tables",
     "plots",
     "reports",
     "api",

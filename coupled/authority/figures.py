@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import groupby
 from typing import TYPE_CHECKING
 
 from coupled.authority.held import breakaway_force
-from coupled.display import System, percent, shown
+from coupled.display import Shown, System, drawn, parameter_label, percent, shown
 from coupled.errors import listed
 from coupled.record.channels import SURFACES, unit_of
 from coupled.rig.guesses import guess_note
-from coupled.units import DEGREE_rad, INCH_m
+from coupled.units import DEGREE_rad
 
 if TYPE_CHECKING:
     from coupled.authority.outcome import Flight, Outcome
@@ -64,21 +64,67 @@ FIGURES: tuple[Figure, ...] = (
 )
 
 
+# Of the figures that a sweep keeps, over flights of any control.
+_KEPT: dict[str, str] = {
+    "asked_norm": "surface asked",
+    "reached_norm": "surface reached",
+    "hand_travel_norm": "hand's travel",
+    "loss": "authority lost",
+    "loss_closed_form": "loss by closed form",
+    "felt_ratio": "felt over specified",
+    "felt_ratio_closed_form": "felt by closed form",
+    "force_N": "force needed",
+    "force_step_N": "force step",
+    "peak_rate_rad_per_s": "peak rate",
+    "peak_load_factor": "peak load factor",
+    "time_to_attitude_s": "time to attitude",
+    "surface_stop_norm": "surface at its stop",
+}
+
+
+def kept_figure(name: str, system: System = "si") -> Shown:
+    """Return the words, unit and factor of a column of a sweep's table: a figure, or a parameter.
+
+    A parameter stays in its SI unit, which is part of its words.
+    """
+    if name not in _KEPT:
+        return Shown("", words=parameter_label(name))
+    unit = shown(name, system)
+    written = f"{unit.unit} of travel" if name.endswith("_norm") else unit.unit
+    return replace(unit, unit=written, words=_KEPT[name])
+
+
+def cases_of(flights: Sequence[Flight]) -> list[list[Flight]]:
+    """Return the flights of each case, in their order."""
+    return [list(group) for _, group in groupby(flights, key=lambda f: f.outcome.case)]
+
+
+def flown_once(cases: Sequence[Sequence[Flight]]) -> bool:
+    """Return whether there are several cases, each flown in one configuration only."""
+    return len(cases) > 1 and all(len(case) == 1 for case in cases)
+
+
+def tabulated(flights: Sequence[Flight]) -> list[list[Flight]]:
+    """Return the flights of each table of a comparison: of each case, or all if flown once."""
+    cases = cases_of(flights)
+    return [list(flights)] if flown_once(cases) else cases
+
+
 def rows(flights: Sequence[Flight], system: System = "si") -> Iterator[tuple[str, list[str]]]:
     """Yield each figure that any of the flights has: its label, and its text for each flight."""
     manoeuvre = flights[0].manoeuvre
     rate, angle = _WORDS[manoeuvre.control]
     change = manoeuvre.measure.attitude_change / DEGREE_rad
-    size, unit = _travel(manoeuvre, system)
-    force = shown("force_N", system)
-    factors = {"hand_travel_norm": size, "force_N": force.factor, "force_step_N": force.factor}
+    travel, force = _travel(manoeuvre, system), shown("force_N", system)
+    factors = {"hand_travel_norm": travel.factor}
+    factors |= {"force_N": force.factor, "force_step_N": force.factor}
     for figure in FIGURES:
         factor = factors.get(figure.field, 1.0)
         written = [figure.written(flight.outcome, factor) for flight in flights]
         if any(text != NONE for text in written):
             yield (
                 figure.label.format(
-                    rate=rate, angle=angle, change=change, unit=unit, force=force.unit
+                    rate=rate, angle=angle, change=change, unit=travel.unit, force=force.unit
                 ),
                 written,
             )
@@ -91,12 +137,11 @@ def _end(flight: Flight) -> str:
     return f"{flight.record.time_s[-1]:.1f}" if flight.ended_early else NONE
 
 
-def _travel(manoeuvre: Manoeuvre, system: System) -> tuple[float, str]:
-    """Return the travel of the compared control, and its unit."""
+def _travel(manoeuvre: Manoeuvre, system: System) -> Shown:
+    """Return the travel of the compared control as a factor, and its unit."""
+    unit = drawn(f"travel_{unit_of(manoeuvre.control)}", system, fine=True)
     travel = manoeuvre.rig.controls[manoeuvre.control].travel
-    if unit_of(manoeuvre.control) == "rad":
-        return travel / DEGREE_rad, "°"
-    return (travel / INCH_m, "in") if system == "us" else (1000.0 * travel, "mm")
+    return replace(unit, factor=unit.factor * travel)
 
 
 def corrects_nothing(flight: Flight) -> bool:
@@ -126,7 +171,7 @@ def remarks(flights: Sequence[Flight], system: System = "si") -> list[str]:
     authority under a force that moves the surface as far as on the rigid rig, and the numbers of
     the rig that are guesses.
     """
-    cases = [list(group) for _, group in groupby(flights, key=lambda f: f.outcome.case)]
+    cases = cases_of(flights)
     held = next(filter(None, (explain_loss(case, system) for case in cases)), "")
     said = [_without_correction(flights), *_resting(cases, system), *_saturated(cases), held]
     said.append(guessed(flights))
@@ -250,11 +295,11 @@ def explain_loss(case: Sequence[Flight], system: System = "si") -> str:
     if not moved:
         return ""
     bent, alike = moved[0], moves_surface_alike(moved[0], rigid)
-    size, unit = _travel(manoeuvre, system)
+    full = _travel(manoeuvre, system)
     where = f" ({bent.case})" if manoeuvre.label != manoeuvre.name else ""
-    travels = [size * abs(each.hand_travel_norm) for each in (*moved, rigid)]
-    digits = _digits_between(travels[:-1], travels[-1], 1 if unit == "in" else 0)
-    written = [f"{travel:.{digits}f} {unit}" for travel in travels]
+    travels = [full.factor * abs(each.hand_travel_norm) for each in (*moved, rigid)]
+    digits = _digits_between(travels[:-1], travels[-1], 1 if full.unit == "in" else 0)
+    written = [f"{travel:.{digits}f} {full.unit}" for travel in travels]
     places = (written[0], written[-1])
     others = [
         f"{each.configuration} {written[number]} and {percent(each.loss, 0)}"

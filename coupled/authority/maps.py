@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import polars as pl
 from numpy.typing import NDArray
 
 from coupled.errors import InputError
@@ -73,6 +74,18 @@ class Feel:
     pressure_Pa: Floats
     per_g_N: dict[Configuration, Floats]
     per_knot_N: dict[Configuration, Floats]
+
+    def to_polars(self) -> pl.DataFrame:
+        """Return a row for each speed, in SI; null where there is no force."""
+        columns = {
+            "calibrated_airspeed_m_per_s": self.calibrated_airspeed_m_per_s,
+            "dynamic_pressure_Pa": self.pressure_Pa,
+        }
+        for name in FELT:
+            word = "specified" if name == "rigid" else name
+            columns[f"{word}_force_per_g_N"] = self.per_g_N[name]
+            columns[f"{word}_pull_per_knot_N"] = self.per_knot_N[name]
+        return pl.DataFrame(columns).fill_nan(None)
 
 
 def loss_maps(rig: Rig, control: ControlName) -> list[LossMap]:

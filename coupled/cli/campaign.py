@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+from rich.markup import escape
 
 from coupled.cli.app import (
     JsonOption,
@@ -27,6 +28,8 @@ from coupled.outputs import Outputs
 from coupled.resources import find, shipped_sweeps
 
 if TYPE_CHECKING:
+    import polars as pl
+
     from coupled.campaign.sweep import SweepResult
     from coupled.display import System
     from coupled.plots.layout import Layout
@@ -47,8 +50,9 @@ def check(
     from coupled.campaign.check import check as check_runs
     from coupled.campaign.check import read_expecting
     from coupled.campaign.junit import junit_xml
-    from coupled.cli.tables.campaign import print_verdicts
+    from coupled.cli.tables import print_table
     from coupled.flight.manifest import input_files
+    from coupled.tables.campaign import verdict_tables
 
     found = [read_expecting(name) for name in run]
     names = [scenarios[0].name for scenarios in found]
@@ -76,7 +80,11 @@ def check(
             note = " ".join(dict.fromkeys(filter(None, notes)))
             write_report(report, outputs, inputs, lambda made: reported(checked, made, units), note)
     if json_file != "-":
-        print_verdicts(out, checked.verdicts, units)
+        for shown in verdict_tables(checked.verdicts, units):
+            print_table(out, shown)
+            out.print()
+        held = sum(verdict.passed for verdict in checked.verdicts)
+        out.print(f"{held} of {checked.total} expectations hold", highlight=False)
         if junit is not None:
             say(f"JUnit XML: {junit}")
         say_report(report)
@@ -176,9 +184,10 @@ def _show(
     (path, layout), (report, units) = figure, handed
     from coupled.campaign.sensitivity import INDICES, write_indices
     from coupled.campaign.sweep import TABLE
-    from coupled.cli.tables.campaign import print_indices, print_survival, print_sweep
+    from coupled.cli.tables import print_table
     from coupled.plots.results import draw_result
     from coupled.plots.saving import save
+    from coupled.tables.campaign import indices_table, spread_table, survival_table
 
     asked, table = found.plan.sweep, found.table
     rows = [index.as_dict() for index in found.indices] or table.to_dicts()
@@ -193,14 +202,25 @@ def _show(
             inputs = [found.plan.file, found.plan.run_file, *sorted(found.plan.files)]
             write_report(report, outputs, inputs, lambda made: sweep_report(found, made, units))
     if json_file != "-":
-        print_sweep(out, table, asked.keep, units)
+        print_table(out, spread_table(table, asked.keep, units), gap=1)
+        _say_ended(table)
         for sentence in found.remarks:
             out.print(sentence, markup=False, highlight=False)
-        print_survival(out, found.limits)
+        if found.limits:
+            print_table(out, survival_table(found.limits, found.numeric_keys[0]), gap=1)
         say(f"table: {target / TABLE}  ({len(table)} flights)")
         if found.indices:
-            print_indices(out, found.indices)
+            print_table(out, indices_table(found.indices), gap=1)
             say(f"indices: {target / INDICES}")
         say(f"figure: {path}")
         say_report(report)
     print_json(rows, json_file)
+
+
+def _say_ended(table: pl.DataFrame) -> None:
+    """Print how many flights ended early, and why the first of them did."""
+    ended = table.filter(table["ended_early"] != "")
+    if len(ended):
+        first = ended.row(0, named=True)
+        why = f"the first, flight {first['flight']}: {first['ended_early']}"
+        out.print(f"[yellow]{len(ended)} of {len(table)} ended early[/]; {escape(why)}")

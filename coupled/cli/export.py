@@ -7,11 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.markup import escape
-from rich.table import Table
 
 from coupled.cli.app import JsonOption, app
 from coupled.cli.progress import progress
-from coupled.cli.tables.whole import print_whole
 from coupled.cli.terminal import check_json, err, give_json, out, say
 from coupled.errors import InputError, nearest
 from coupled.resources import find, shipped_rigs
@@ -79,20 +77,11 @@ def _select(rig: Rig, name: str, runs: list[str], case: str) -> tuple[Rig, list[
 
 
 def _say(made: Export, folder: Path, others: list[str]) -> None:
+    from coupled.cli.tables import print_table
+    from coupled.tables.flights import export_table
+
     if made.beside:
-        table = Table(
-            "run", "case", "deflection", "force", "F_mod", "lost", box=None, pad_edge=False
-        )
-        for one in made.beside:
-            lost = "" if one.loss is None else f"{100.0 * one.loss:+.3f}"
-            table.add_row(
-                *(one.run, escape(f"{one.case}, {one.configuration}")),
-                *(f"{100.0 * x:.3f} %" for x in (one.deflection, one.force, one.modifying_force)),
-                lost,
-            )
-        out.print("by JSBSim alone, off coupled's own flight by (deflection of travel, forces of")
-        out.print("the greatest, the authority lost in points):")
-        print_whole(out, table)
+        print_table(out, export_table(made))
     for line in made.left:
         err.print(f"[yellow]left out:[/] {escape(line)}", soft_wrap=True)
     for line in made.scripted:

@@ -9,16 +9,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.markup import escape
-from rich.table import Table
 
 from coupled.cli.app import JsonOption, UnitsOption, app
 from coupled.cli.new import check_new, new, write_new
 from coupled.cli.progress import progress
 from coupled.cli.rigs import ControlOption
-from coupled.cli.tables.whole import print_whole
 from coupled.cli.terminal import check_json, give_json, out, say
-from coupled.display import System, in_system, percent
+from coupled.display import System, in_system
 from coupled.errors import InputError, shown
 from coupled.record.channels import TIME, ControlName, control_named
 
@@ -73,16 +70,15 @@ def terms(
 
     A rig scales them by name in [flight.terms].
     """
+    from coupled.cli.tables import print_table
     from coupled.surveying.terms import list_terms
+    from coupled.tables.rigs import terms_table
 
     check_json(json_file, [])
     with progress() as advance:
         found = list_terms(model, run or None, advance)
     if json_file != "-":
-        table = Table("term", "axis", "share", box=None, pad_edge=False)
-        for one in found:
-            table.add_row(one.term, one.axis, "" if one.share is None else percent(one.share))
-        print_whole(out, table)
+        print_table(out, terms_table(found))
         say(f"shares in {found.flown}, {_place(found.flight)}")
     give_json(found.as_dict(), json_file)
 
@@ -92,17 +88,10 @@ def _place(flight: Flight) -> str:
 
 
 def _print(rows: Sequence[Surveyed]) -> None:
-    table = Table("model", "trims at", "controls", "rigs", box=None, pad_edge=False)
-    for row in rows:
-        where, controls = f"[yellow]no:[/] {escape(row.why)}", ""
-        if row.flight is not None:
-            speed, height = row.flight.calibrated_airspeed, row.flight.altitude
-            held = "" if row.holds else ", does not hold"
-            where = f"{speed:g} m/s, {height:g} m{held}"
-            controls = ", ".join(row.controls) or "none"
-            controls += "" if row.direct or not row.controls else " (by a law or lag)"
-        table.add_row(row.model, where, controls, ", ".join(row.rigs))
-    print_whole(out, table)
+    from coupled.cli.tables import print_table
+    from coupled.tables.rigs import models_table
+
+    print_table(out, models_table(rows))
     trimmed = [row for row in rows if row.flight is not None]
     led = [row for row in trimmed if row.controls]
     out.print(f"\n{len(trimmed)} of {len(rows)} trim, {len(led)} can be flown by a rig")
@@ -253,18 +242,11 @@ def _prompt_for_numbers(
 
 def _print_found(found: LogNumbers, control: ControlName, units: System) -> None:
     """Print the numbers of a control found in a log, with their errors."""
+    from coupled.cli.tables import print_table
     from coupled.surveying.benchrig import found_in, questions
+    from coupled.tables.rigs import logged_table
 
-    numbers, sure = found_in(found)
-    table = Table("of the log", "value", "", box=None, pad_edge=False)
-    for name, value in numbers.items():
-        question = questions(control)[name]
-        unit = in_system(question.unit, units)
-        words = "determined" if name in sure else "the log does not determine it: a guess"
-        if name == "travel":
-            words = "the greatest in the log: a guess"
-        table.add_row(question.words, f"{unit.written(value)} {unit.unit}", words)
-    print_whole(out, table)
+    print_table(out, logged_table(*found_in(found), questions(control), units))
 
 
 def _for_model(model: str, file: Path | None, airframe_only: bool) -> None:

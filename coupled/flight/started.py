@@ -60,7 +60,9 @@ class StartedFlight:
         self._actions = _actions(manoeuvre, airframe.motion()[PRESSURE])
         self.grips = {str(name): action.hand for name, action in self._actions.items()}
         self.controls = pack(rig, self.grips)
-        self.served = Served(manoeuvre, self.controls, companion is not None and companion.sets_services)
+        self.served = Served(
+            manoeuvre, self.controls, companion is not None and companion.sets_services
+        )
         self._noise = ChannelNoise(self._own_channels, rig.noise, manoeuvre.seed)
         self.data = np.zeros((0, len(self._own_channels)))
         self._hiss = self.data if lateness(rig) else None

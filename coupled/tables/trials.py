@@ -1,12 +1,9 @@
-"""The score of blind trials on a terminal of 80 columns."""
+"""The tables of the score of blind trials."""
 
 from __future__ import annotations
 
-from rich.console import Console
-from rich.table import Table
-
 from coupled.blind.trials.result import Score, Share
-from coupled.cli.tables.whole import print_whole
+from coupled.tables.table import Table
 
 
 def _lines(score: Score) -> list[tuple[str, Share]]:
@@ -35,22 +32,14 @@ def _lines(score: Score) -> list[tuple[str, Share]]:
     ]
 
 
-def print_score(console: Console, score: Score) -> None:
-    """Print a score: shares with their exact intervals, power, and the confusions."""
-    table = Table("", box=None, pad_edge=False)
-    for head in ("share", "95 % interval", "of"):
-        table.add_column(head, justify="right", no_wrap=True)
-    for label, found in _lines(score):
-        if found.share is not None:
-            table.add_row(label, percent(found.share), span(found), str(found.of))
-    print_whole(console, table)
-    stated = score.probabilities
-    if stated.brier is not None:
-        console.print(f"\nBrier score of {stated.effects} probabilities: {stated.brier:.3f}")
-    if score.missing:
-        console.print(f"[yellow]without a diagnosis:[/] {score.missing} of {score.records}")
-    _print_power(console, score)
-    _print_effects(console, score)
+def score_table(score: Score) -> Table:
+    """Return the shares of a score, each with its exact interval."""
+    rows = tuple(
+        (label, percent(found.share), span(found), str(found.of))
+        for label, found in _lines(score)
+        if found.share is not None
+    )
+    return Table(("", "share", "95 % interval", "of"), rows)
 
 
 def percent(share: float | None) -> str:
@@ -65,25 +54,24 @@ def span(found: Share) -> str:
     return f"{100.0 * found.low:.0f} to {100.0 * found.high:.0f} %"
 
 
-def _print_power(console: Console, score: Score) -> None:
-    table = Table("residual enlarged", box=None, pad_edge=False, title_justify="left")
-    for head in ("identified", "95 % interval", "wrong", "of"):
-        table.add_column(head, justify="right")
+def detection_table(score: Score) -> Table:
+    """Return the share of effects identified, by the size of the effect."""
+    rows = []
     for row in score.power:
         named = row.named
-        size = f"{row.ratio:.1f} times"
-        table.add_row(size, percent(named.share), span(named), str(row.wrong), str(named.of))
-    console.print()
-    print_whole(console, table)
+        numbers = (percent(named.share), span(named), str(row.wrong), str(named.of))
+        rows.append((f"{row.ratio:.1f} times", *numbers))
+    heads = ("residual enlarged", "identified", "95 % interval", "wrong", "of")
+    return Table(heads, tuple(rows))
 
 
-def _print_effects(console: Console, score: Score) -> None:
-    table = Table("", "correct", "given instead", box=None, pad_edge=False)
+def confusion_table(score: Score) -> Table:
+    """Return how often each effect was identified, and the effects given instead."""
+    rows = []
     for name, row in score.effects.items():
         instead = "; ".join(
             (f"{times} × " if times > 1 else "") + said.replace("_", " ")
             for said, times in row.instead.items()
         )
-        table.add_row(name.replace("_", " "), f"{row.right}/{row.of}", instead)
-    console.print()
-    print_whole(console, table)
+        rows.append((name.replace("_", " "), f"{row.right}/{row.of}", instead))
+    return Table(("", "correct", "given instead"), tuple(rows), align="l")
