@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import subprocess
+from ctypes import c_double, c_int, c_uint
 from pathlib import Path
 from typing import Any
 
@@ -73,14 +74,14 @@ def bench(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
 
 @pytest.mark.parametrize("name", SHIPPED)
 def test_each_shipped_rig_is_valid_and_does_as_it_flies(name: str, tmp_path: Path) -> None:
-    """Every control, FMI 2 with the force's derivative, FMI 3 with its rate as an input."""
+    """Every control, by FMI 2 and 3."""
     rig = shipped(name)
     made = {}
     for seed, control in enumerate(rig.controls):
         record = flown(rig, control, 4.0, seed)
         for fmi in (2, 3):
             one = loaded(rig, tmp_path, control, fmi)
-            np.savez(one.file.with_suffix(".npz"), **inputs_of(record, one.made, rate=fmi == 3))
+            np.savez(one.file.with_suffix(".npz"), **inputs_of(record, one.made))
             made[one.file.stem] = (one.made, record)
     found = simulated(tmp_path)
     assert set(found) == set(made)
@@ -200,6 +201,20 @@ def test_a_step_of_several_frames_is_several_steps(bench: Loaded) -> None:
         other.doStep(k * T, T)
     assert bench.get(one) == bench.get(other)
     assert bench.get(one, "time") == [6 * T]
+
+
+def test_the_derivative_of_the_force_by_fmi_2_is_its_rate(bench: Loaded) -> None:
+    if bench.made.fmi == 3:
+        pytest.skip("FMI 3 has no derivatives of inputs")
+    one, other = bench.instance(), bench.instance()
+    references, order = (c_uint * 1)(bench.at["column_force_N"]), (c_int * 1)(1)
+    one.fmi2SetRealInputDerivatives(one.component, references, 1, order, (c_double * 1)(90.0))
+    bench.set(other, column_force_rate_N_per_s=90.0)
+    assert bench.run(one, 0, np.full(5, 3.0)) == bench.run(other, 0, np.full(5, 3.0))
+    second = (c_int * 1)(2)
+    with pytest.raises(FMICallException):
+        one.fmi2SetRealInputDerivatives(one.component, references, 1, second, (c_double * 1)(0.0))
+    assert "a derivative of order 2" in bench.said[-1]
 
 
 @pytest.mark.parametrize(

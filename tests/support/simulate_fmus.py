@@ -29,7 +29,6 @@ def simulate(fmu: Path) -> None:
         stop_time=columns["time"][-1],
         output_interval=columns["time"][1],
         input=signals,
-        set_input_derivatives="force_rate" not in "".join(columns),
     )
     outputs = {name: found[name] for name in found.dtype.names}
     np.savez(fmu.with_suffix(".out.npz"), problems=np.array(validate_fmu(str(fmu))), **outputs)
