@@ -63,8 +63,8 @@ def export(
 
     file = find(rig, shipped_rigs(), "rig")
     if fmu is not None:
-        others = {"--jsbsim": jsbsim, "--run": run and not case, "--no-check": no_check}
-        _refuse(rig, others | {"--loader-rate-Hz": rate != RATE_Hz}, "leave it out with --fmu")
+        needless = {"--jsbsim": jsbsim, "--run": run and not case, "--no-check": no_check}
+        _refuse(rig, needless | {"--loader-rate-Hz": rate != RATE_Hz}, "leave it out with --fmu")
         exported, _ = _asked(read_rig(file), rig, run or [], case) if case else (read_rig(file), [])
         _export_fmu(exported, fmu, control, fmi, file, json_file)
         return

@@ -12,6 +12,7 @@ from coupled.exporting.fmu.descriptions import PARAMETERS
 from coupled.exporting.fmu.laws import laws
 from coupled.exporting.fmu.numbers import evaluated, parameters, place_of, words
 from coupled.exporting.fmu.variables import variables
+from coupled.exporting.fmu.write import left_out
 from coupled.resources import shipped_rigs
 from coupled.rig.parameters import Control
 from coupled.rig.rig import Rig
@@ -109,6 +110,20 @@ def test_variables_have_unique_names_units_and_descriptions() -> None:
 )
 def test_a_unit_has_its_base_units(key: str, name: str, exponents: dict[str, int]) -> None:
     assert unit(key) == (name, exponents)
+
+
+def test_what_is_left_out_is_told() -> None:
+    rig = shipped("t37").changed(
+        {
+            "noise": {"column_force_N": 0.1},
+            "structure.column_by_wheel_m_per_N": 1e-6,
+            "controls.column.services.soft_stop_m": 0.1,
+        }
+    )
+    assert [line.partition(":")[0] for line in left_out(rig, "column")] == [
+        *("noise", "structure", "controls.column.services"),
+    ]
+    assert left_out(shipped("bench").changed({"noise": {}}), "column") == ()
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from fmpy.fmi1 import FMICallException
 
+from coupled.exporting.fmu.build import COMPILERS
 from coupled.exporting.fmu.numbers import Place, parameters, place_of, words
 from coupled.resources import shipped_rigs
 from coupled.rig.control import CONTROL
@@ -21,12 +22,16 @@ from tests.support.fmus import (
     Loaded,
     assert_follows,
     flown,
+    give,
     inputs_of,
     loaded,
     simulated,
 )
 
-pytestmark = pytest.mark.slow
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not any(map(shutil.which, COMPILERS)), reason="needs a C compiler"),
+]
 
 SHIPPED = sorted(shipped_rigs())
 # Rigs with most effects at once: of the first, all work on a bench; the second is in flight.
@@ -81,7 +86,7 @@ def test_each_shipped_rig_is_valid_and_does_as_it_flies(name: str, tmp_path: Pat
         record = flown(rig, control, 4.0, seed)
         for fmi in (2, 3):
             one = loaded(rig, tmp_path, control, fmi)
-            np.savez(one.file.with_suffix(".npz"), **inputs_of(record, one.made))
+            give(one, inputs_of(record, one.made))
             made[one.file.stem] = (one.made, record)
     found = simulated(tmp_path)
     assert set(found) == set(made)
@@ -96,13 +101,13 @@ def test_effects_are_those_that_fly(name: str, tmp_path: Path) -> None:
     record = flown(rig, "column", 4.0, 7)
     one = loaded(rig, tmp_path, "column", 3)
     assert ("alpha_rad" in one.made.inputs) == (name == "c172p")
-    np.savez(one.file.with_suffix(".npz"), **inputs_of(record, one.made))
+    give(one, inputs_of(record, one.made))
     assert_follows(simulated(tmp_path)[one.file.stem], record, one.made)
 
 
 def test_parameters_make_one_rig_another(tmp_path: Path) -> None:
     """The FMU of the shipped bench, with the other rig's numbers set, does as the other flies."""
-    changes = {
+    changes: dict[str, Any] = {
         "loader.mass_kg": 5.0,
         "loader.damping_N_s_per_m": 90.0,
         "loader.friction_N": 2.0,
@@ -121,7 +126,7 @@ def test_parameters_make_one_rig_another(tmp_path: Path) -> None:
     )
     record = flown(other, "column", 3.0, 3)
     one = loaded(shipped("bench"), tmp_path)
-    np.savez(one.file.with_suffix(".npz"), **inputs_of(record, one.made), **changes)
+    give(one, inputs_of(record, one.made) | changes)
     assert_follows(simulated(tmp_path)[one.file.stem], record, one.made)
 
 
@@ -192,7 +197,7 @@ def test_a_saved_state_steps_back(bench: Loaded) -> None:
 
 
 def test_a_step_of_several_frames_is_several_steps(bench: Loaded) -> None:
-    values = {"column_force_N": 5.0, "column_force_rate_N_per_s": 60.0}
+    values: dict[str, Any] = {"column_force_N": 5.0, "column_force_rate_N_per_s": 60.0}
     one, other = bench.instance(**values), bench.instance(**values)
     T = bench.made.frame_s
     one.doStep(0.0, 6 * T)

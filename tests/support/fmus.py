@@ -132,7 +132,7 @@ def flown(rig: Rig, control: str, seconds: float, seed: int) -> Record:
     return flight.record
 
 
-def inputs_of(record: Record, made: Fmu) -> dict[str, Floats]:
+def inputs_of(record: Record, made: Fmu) -> dict[str, Any]:
     """Return an FMU's inputs from a record."""
     force = record[f"{made.control}_hand_force_N"]
     found = {"time": record.time_s, f"{made.control}_force_N": force}
@@ -142,6 +142,11 @@ def inputs_of(record: Record, made: Fmu) -> dict[str, Floats]:
         if name in made.inputs and name in record:
             found[name] = record[name]
     return found
+
+
+def give(one: Loaded, columns: Mapping[str, Any]) -> None:
+    """Write an FMU's inputs and start values for `simulated`."""
+    np.savez(one.file.with_suffix(".npz"), **dict(columns))
 
 
 def simulated(folder: Path) -> dict[str, dict[str, Any]]:

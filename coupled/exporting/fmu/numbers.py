@@ -221,4 +221,4 @@ def _changed(data: Control, name: str, to: float) -> Control:
 def _whole_words() -> NDArray[np.bool_]:
     """Return which words of a control are integers."""
     marked = np.ones(1, CONTROL)  # 1 as an integer differs from 1 as a double
-    return np.frombuffer(marked.tobytes(), np.int64) == 1
+    return np.asarray(np.frombuffer(marked.tobytes(), np.int64) == 1, np.bool_)

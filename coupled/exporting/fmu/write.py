@@ -9,7 +9,7 @@ import uuid
 import zipfile
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, cast
+from typing import Literal
 
 from coupled.errors import InputError, listed, nearest
 from coupled.exporting.fmu.build import c_compiler, shared_library, this_platform
@@ -75,7 +75,7 @@ def chosen_control(rig: Rig, control: str, file: object) -> ControlName:
         raise InputError(file, "control", f"the rig has no {control!r}; {nearest(control, names)}")
     if not control and len(names) > 1:
         raise InputError(file, "control", f"an FMU has one control; choose of {listed(names)}")
-    return cast(ControlName, control or names[0])
+    return control or names[0]
 
 
 def make_fmu(rig: Rig, control: str = "", fmi: Fmi = 3) -> Fmu:
@@ -112,7 +112,7 @@ def make_fmu(rig: Rig, control: str = "", fmi: Fmi = 3) -> Fmu:
     return Fmu(
         *(rig, name, fmi, str(made_for), frame_s),
         *(by_role["input"], by_role["output"], by_role["parameter"]),
-        *(_left(rig, name), held.getvalue()),
+        *(left_out(rig, name), held.getvalue()),
     )
 
 
@@ -121,17 +121,19 @@ def write_fmu(made: Fmu, file: Path) -> None:
     write_whole(file, lambda part: part.write_bytes(made.content))
 
 
-def _left(rig: Rig, control: ControlName) -> tuple[str, ...]:
+def left_out(rig: Rig, control: ControlName) -> tuple[str, ...]:
     """Return the parts of a rig that the FMU of a control does not have, a line each."""
     found, data = [], rig.controls[control]
     if rig.noise:
-        found.append("noise: the FMU's readings have none")
+        found.append("noise: readings of the FMU have none")
     if not rig.structure.stands_apart:
-        found.append("structure: forces on other controls bend nothing here")
+        found.append("structure: forces on other controls do not bend this one")
     if data.loader.crosstalk != 0.0:
-        found.append(f"controls.{control}.loader.crosstalk: there is no other control's force")
+        found.append(f"controls.{control}.loader.crosstalk: the FMU has no other control")
     if data.sensing.force_stamp != 0.0:
-        found.append(f"controls.{control}.sensing.force_stamp_s: an effect of the recorder")
+        found.append(f"controls.{control}.sensing.force_stamp_s: it acts in a record only")
     if has_services(data):
-        found.append(f"controls.{control}.services: events; the forces that need none are there")
+        found.append(
+            f"controls.{control}.services: commands by events; forces without a command stay"
+        )
     return tuple(found)
