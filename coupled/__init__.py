@@ -42,6 +42,7 @@ Analyse and hand on
     stability       where a rig is stable, over K·G_T
     document        forces and control checks of 14 CFR Part 60
     export          a rig's loader as JSBSim systems
+    export_fmu      a control's loader as an FMU
 
 Results display themselves in a notebook. Each has `.report(file)`, most have `.plot()`,
 `.to_polars()` and `.to_pandas()`.
@@ -69,7 +70,7 @@ if TYPE_CHECKING:
     from coupled.api.analyses import map_authority, stability
     from coupled.api.benches import bench, plan
     from coupled.api.documents import document
-    from coupled.api.exports import export
+    from coupled.api.exports import export, export_fmu
     from coupled.api.flights import compare, fly, load_run
     from coupled.api.gaps import diagnose, fit
     from coupled.api.records import import_log, read_record, write_record
@@ -120,6 +121,7 @@ __all__ = [
     "diagnose",
     "document",
     "export",
+    "export_fmu",
     "fit",
     "fly",
     "import_log",
@@ -141,7 +143,7 @@ _HOMES = {
     "coupled.api.analyses": ("map_authority", "stability"),
     "coupled.api.benches": ("bench", "plan"),
     "coupled.api.documents": ("document",),
-    "coupled.api.exports": ("export",),
+    "coupled.api.exports": ("export", "export_fmu"),
     "coupled.api.flights": ("compare", "fly", "load_run"),
     "coupled.api.gaps": ("diagnose", "fit"),
     "coupled.api.records": ("import_log", "read_record", "write_record"),

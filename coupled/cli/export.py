@@ -1,7 +1,8 @@
-"""The command `export`: writes a loader as JSBSim systems."""
+"""The command that takes a loader to other simulators: export."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -15,6 +16,7 @@ from coupled.errors import InputError, nearest
 from coupled.resources import find, shipped_rigs
 
 if TYPE_CHECKING:
+    from coupled.exporting.fmu.write import Fmu
     from coupled.exporting.write import Export
     from coupled.flight.manoeuvre import Manoeuvre
     from coupled.rig.rig import Rig
@@ -22,12 +24,20 @@ if TYPE_CHECKING:
 
 @app.command(
     epilog="[dim]Examples: coupled export t37 --jsbsim out/t37-jsbsim"
+    " · coupled export t37 --fmu out/t37-column.fmu --control column"
     " · coupled export my-rig.toml --jsbsim DIR --run my-run.toml"
     " · coupled export report-column --jsbsim DIR --run multiplier --case 'digital 20 Hz'[/]"
 )
 def export(
     rig: Annotated[str, typer.Argument(help="A rig file, or the name of a shipped one.")],
-    jsbsim: Annotated[Path, typer.Option(help="The folder to write: new, or a former export.")],
+    jsbsim: Annotated[
+        Path | None, typer.Option(help="The folder to write: new, or a former export.")
+    ] = None,
+    fmu: Annotated[Path | None, typer.Option(help="The FMU to write, for this platform.")] = None,
+    control: Annotated[str, typer.Option(help="The control of the FMU, of several.")] = "",
+    fmi: Annotated[
+        int, typer.Option(help="The version of FMI.", min=2, max=3, show_default=True)
+    ] = 3,
     run: Annotated[
         list[str] | None,
         typer.Option(help="A run to write scripts of; may be repeated. (default: the rig's)"),
@@ -43,12 +53,24 @@ def export(
     ] = False,
     json_file: JsonOption = "",
 ) -> None:
-    """Write a rig's loader as JSBSim systems, with the aircraft and scripts that JSBSim flies."""
+    """Write a rig's loader as JSBSim systems with aircraft and scripts, or as an FMU."""
     from coupled.exporting.folder import check_folder, exportable, write_export
+    from coupled.exporting.write import RATE_Hz
     from coupled.exporting.write import export as make
     from coupled.rig.rigfile import read_rig
 
     file = find(rig, shipped_rigs(), "rig")
+    if fmu is not None:
+        needless = {"--jsbsim": jsbsim, "--run": run and not case, "--no-check": no_check}
+        _refuse(rig, needless | {"--loader-rate-Hz": rate != RATE_Hz}, "leave it out with --fmu")
+        exported, _ = (
+            _select(read_rig(file), rig, run or [], case) if case else (read_rig(file), [])
+        )
+        _export_fmu(exported, fmu, control, fmi, file, json_file)
+        return
+    _refuse(rig, {"--control": control, "--fmi": fmi != 3}, "is for --fmu only")
+    if jsbsim is None:
+        raise InputError(rig, "--jsbsim", "is missing; give it, or --fmu")
     check_folder(jsbsim)
     check_json(json_file, [file])
     exported, cases = _select(read_rig(file), rig, run or [], case)
@@ -59,6 +81,35 @@ def export(
     if json_file != "-":
         _say(made, jsbsim, others)
     give_json([one.as_dict() for one in made.beside], json_file)
+
+
+def _refuse(rig: str, given: Mapping[str, object], problem: str) -> None:
+    """Raise InputError for an option that is given and has no effect."""
+    for option, value in given.items():
+        if value:
+            raise InputError(rig, option, problem)
+
+
+def _export_fmu(rig: Rig, fmu: Path, control: str, fmi: int, file: Path, json_file: str) -> None:
+    from coupled.exporting.fmu.write import check_file, make_fmu, write_fmu
+
+    check_file(fmu)
+    check_json(json_file, [file, fmu])
+    made = make_fmu(rig, control, 2 if fmi == 2 else 3)
+    write_fmu(made, fmu)
+    if json_file != "-":
+        _say_fmu(made, fmu)
+    give_json(made.as_dict(), json_file)
+
+
+def _say_fmu(made: Fmu, file: Path) -> None:
+    for line in made.left:
+        err.print(f"[yellow]left out:[/] {escape(line)}", soft_wrap=True)
+    say(f"inputs: {', '.join(made.inputs)}")
+    say(f"outputs: {', '.join(made.outputs)}")
+    say(f"parameters: {len(made.parameters)}; all others are constant")
+    say(f"step: {made.frame_s:.9g} s, a frame, or a multiple")
+    say(f"FMU: {file}  (FMI {made.fmi}.0, co-simulation, for {made.platform} only)")
 
 
 def _select(rig: Rig, name: str, runs: list[str], case: str) -> tuple[Rig, list[Manoeuvre]]:
