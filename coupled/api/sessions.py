@@ -18,7 +18,7 @@ from coupled.flight.pilot import Pilot
 from coupled.flight.pilot.base import STRONGEST
 from coupled.flight.pilot.own import GivenForce, Law, OwnPilot
 from coupled.flight.started import StartedFlight
-from coupled.flight.state import State, state_of
+from coupled.flight.state import State, state_reader
 from coupled.record.channels import CONTROL_NAMES, ControlName, channel
 from coupled.record.record import EndedEarly, Record
 from coupled.rig.rig import Rig
@@ -104,11 +104,11 @@ class Session:
         self._advance = advance if self._free and not self._refusal else None
         self._own = flight.forces if self._has_own else None
         self._places, data = flight.places(), flight.data
-        self._rows, self._row_bytes = memoryview(data.data).cast("B"), data.strides[0]
+        self._read = state_reader(self._places, data.data)
 
     def _look(self) -> None:
         """Take the state whose host has run."""
-        self._state = state_of(self._places, self._flight.row(self._k))
+        self._state = State(self._places, self._flight.row(self._k))
 
     def __enter__(self) -> Session:
         return self
@@ -201,9 +201,7 @@ class Session:
         self._k = k = k + 1
         if why:
             return self._stop(why)
-        size = self._row_bytes
-        at = k * size
-        self._state = state = state_of(self._places, self._rows[at : at + size].tobytes())
+        self._state = state = self._read(k)
         return state
 
     def _step(self, given: Sequence[float | None]) -> State:
