@@ -99,9 +99,9 @@ _set_values: Any = vars(State)["_values"].__set__
 def state_reader(places: Mapping[str, int], rows: memoryview) -> Callable[[int], State]:
     """Return a function for the state of a row; quicker than the class, for every frame.
 
-    `rows` has shape (frames, channels), and no row is wider than `places`.
+    `rows` has shape (frames, channels).
     """
-    size, flat = rows.strides[0], rows.cast("B")
+    size, flat = _NUMBER_bytes * len(places), rows.cast("B")
     new, set_places, set_values = object.__new__, _set_places, _set_values
 
     def read(k: int) -> State:
