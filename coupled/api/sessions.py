@@ -18,7 +18,7 @@ from coupled.flight.pilot import Pilot
 from coupled.flight.pilot.base import STRONGEST
 from coupled.flight.pilot.own import GivenForce, Law, OwnPilot
 from coupled.flight.started import StartedFlight
-from coupled.flight.state import State, state_of
+from coupled.flight.state import State, state_reader
 from coupled.record.channels import CONTROL_NAMES, ControlName, channel
 from coupled.record.record import EndedEarly, Record
 from coupled.rig.rig import Rig
@@ -91,26 +91,24 @@ class Session:
         self._has_own = any(isinstance(pilot, OwnPilot) for pilot in pilots.values())
         self._k = 0
         self._ended: EndedEarly | None = None
-        self._continue()
         self._refusal = ""
-        self._quick = not self._has_own and self._free.get("column") == 0
+        self._continue()
         self._begin(0)
         self._look()
 
     def _continue(self) -> None:
         """Take the flight's functions, which are other ones for longer arrays."""
         flight = self._flight
-        self._begin, self._end, self._again = flight.frames.steps()
+        self._begin, self._end, self._again, advance = flight.frames.steps()
+        # Of a column alone, whose force is given, a step has few calls.
+        self._advance = advance if self._free and not self._refusal else None
         self._own = flight.forces if self._has_own else None
         self._places, data = flight.places(), flight.data
-        # The rows' bytes, if the record has no channels beside them.
-        plain = len(self._places) == data.shape[1]
-        self._rows = memoryview(data.data).cast("B") if plain else None
-        self._row_bytes = data.strides[0]
+        self._read = state_reader(self._places, data.data)
 
     def _look(self) -> None:
         """Take the state whose host has run."""
-        self._state = state_of(self._places, self._flight.row(self._k))
+        self._state = State(self._places, self._flight.row(self._k))
 
     def __enter__(self) -> Session:
         return self
@@ -185,34 +183,45 @@ class Session:
         positive. Without its force a hand is off its grip. When the flight ends early, the state is
         the last one, and another step raises InputError.
         """
-        forces: Sequence[float]
+        k, advance = self._k, self._advance
         if (
-            self._quick
-            and type(column_force_N) is float
-            and -STRONGEST <= column_force_N <= STRONGEST
-            and wheel_force_N is None
-            and pedals_force_N is None
+            advance is None
+            or type(column_force_N) is not float
+            or not -5000.0 <= column_force_N <= 5000.0  # STRONGEST; a constant is quicker
+            or k + 1 == self._capacity
+            or wheel_force_N is not None
+            or pedals_force_N is not None
         ):
-            forces = (column_force_N, 0.0, 0.0)
-        else:
-            forces = self._forces((column_force_N, wheel_force_N, pedals_force_N))
+            return self._step((column_force_N, wheel_force_N, pedals_force_N))
+        try:
+            why = advance(k, column_force_N)
+        except BaseException:
+            self._interrupt()
+            raise
+        self._k = k = k + 1
+        if why:
+            return self._stop(why)
+        self._state = state = self._read(k)
+        return state
+
+    def _step(self, given: Sequence[float | None]) -> State:
+        """Fly one frame of any flight, under the forces given to column, wheel and pedals."""
+        forces = self._forces(given)
         try:
             self._end(self._k, forces)
-            self._k = k = self._k + 1
-            if k == self._capacity:
+            self._k += 1
+            if self._k == self._capacity:
                 self._extend()
-            if why := self._begin(k):
-                self._stop(why)
-                return self._state
+            if why := self._begin(self._k):
+                return self._stop(why)
         except BaseException:
-            self._refuse(f"was interrupted at {self.time_s:.4g} s; call reset()")
+            self._interrupt()
             raise
-        if self._rows is None:
-            self._look()
-        else:
-            at, size = k * self._row_bytes, self._row_bytes
-            self._state = state_of(self._places, self._rows[at : at + size].tobytes())
+        self._look()
         return self._state
+
+    def _interrupt(self) -> None:
+        self._refuse(f"was interrupted at {self.time_s:.4g} s; call reset()")
 
     def _forces(self, given: Sequence[float | None]) -> Sequence[float]:
         """Return the forces of the rig's controls in its order, N, checked."""
@@ -236,7 +245,7 @@ class Session:
 
     def _refuse(self, why: str) -> None:
         """Refuse further steps."""
-        self._refusal, self._quick = why, False
+        self._refusal, self._advance = why, None
 
     def _extend(self) -> None:
         most = round(_LONGEST_s * self._begun.rig.frame_rate) + 1
@@ -246,9 +255,11 @@ class Session:
         self._flight.extend(self._capacity)
         self._continue()
 
-    def _stop(self, why: str) -> None:
+    def _stop(self, why: str) -> State:
+        """End the flight; the state is that of its last frame."""
         self._ended = EndedEarly(why, self.time_s)
         self._refuse(f"the flight is over: {self._ended}; call reset()")
+        return self._state
 
     def reset(self, seed: int | None = None) -> State:
         """Return to trim, with the rig as it was at first, and return the state there.

@@ -250,11 +250,15 @@ def _three_frames(aircraft: PlainAircraft, placed: Placed) -> PlainFrames:
 
 
 class PlainSteps(NamedTuple):
-    """A frame in two halves, as `Frames.steps`; `begun` takes the commands of a host run again."""
+    """A frame in two halves, as `Frames.steps`; `begun` takes the commands of a host run again.
+
+    `advance` is `end` of a frame under a force on the column, N, and `begin` of the next one.
+    """
 
     begin: Callable[[int], str]
     end: Callable[[int, Sequence[float]], None]
     begun: Callable[[Commands], None]
+    advance: Callable[[int, float], str] | None = None
 
 
 def plain_steps(aircraft: PlainAircraft, halves: HalfFrames) -> PlainSteps | None:
@@ -272,7 +276,7 @@ def _column_steps(aircraft: PlainAircraft, halves: HalfFrames) -> PlainSteps:
     ((write, trim),) = aircraft.writes
     run, safe_m, trouble = aircraft.run, aircraft.safe_altitude_m, aircraft.trouble
     host, loaders, address = halves.host_column, halves.loaders, halves.address
-    command = 0.0
+    both, command = halves.step_column, 0.0
 
     def begin(k: int) -> str:
         nonlocal command
@@ -298,11 +302,33 @@ def _column_steps(aircraft: PlainAircraft, halves: HalfFrames) -> PlainSteps:
         write(trim + command)
         run()
 
+    def advance(k: int, force: float) -> str:
+        nonlocal command
+        write(trim + command)
+        run()
+        altitude = height() * FOOT_m
+        if not altitude > safe_m and (why := trouble()):
+            return why
+        command = both(
+            address,
+            k,
+            force,
+            qbar() * PSF_Pa,
+            load(),
+            elevator(),
+            pitch_rate(),
+            alpha(),
+            pitch(),
+            speed() * FOOT_m,
+            altitude,
+        )
+        return ""
+
     def begun(commands: Commands) -> None:
         nonlocal command
         command = commands[0]
 
-    return PlainSteps(begin, end, begun)
+    return PlainSteps(begin, end, begun, advance)
 
 
 def _three_steps(aircraft: PlainAircraft, halves: HalfFrames) -> PlainSteps:

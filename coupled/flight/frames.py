@@ -41,11 +41,13 @@ class Steps(NamedTuple):
     """The two parts of a frame; `begin` returns why the flight must end, or an empty string.
 
     `again` makes a change of controls at t_k, after `begin` and before `end`, and repeats the host.
+    `advance`, if any, is `end` of frame k under a force on the column, N, and `begin` of k + 1.
     """
 
     begin: Callable[[int], str]
     end: Callable[[int, Sequence[float]], None]
     again: Callable[[int, Callable[[], None]], None]
+    advance: Callable[[int, float], str] | None = None
 
 
 class Frames:
@@ -107,7 +109,7 @@ class Frames:
                 progress(self.done, frames)
 
     def _one_by_one(self, frames: int, progress: Progress | None) -> None:
-        begin, end, _ = self.steps()
+        begin, end, *_ = self.steps()
         forces = None if self._split is None else self._split.forces
         for k in range(frames):
             if why := begin(k):
@@ -197,4 +199,4 @@ def _plain(steps: PlainSteps, halves: HalfFrames) -> Steps:
         finally:
             steps.begun(halves.begin_again(k))
 
-    return Steps(steps.begin, steps.end, again)
+    return Steps(steps.begin, steps.end, again, steps.advance)

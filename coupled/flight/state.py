@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from array import array
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from struct import Struct
 from typing import Any, NoReturn
 
@@ -94,15 +94,23 @@ class State:
 # The slots' own setters, since a state is made in every frame and has no other.
 _set_places: Any = vars(State)["_places"].__set__
 _set_values: Any = vars(State)["_values"].__set__
-_new = object.__new__
 
 
-def state_of(places: Mapping[str, int], values: bytes) -> State:
-    """Return a state; quicker than the class, for every frame."""
-    state = _new(State)
-    _set_places(state, places)
-    _set_values(state, values)
-    return state
+def state_reader(places: Mapping[str, int], rows: memoryview) -> Callable[[int], State]:
+    """Return a function for the state of a row; quicker than the class, for every frame.
+
+    `rows` has shape (frames, channels).
+    """
+    size, flat = _NUMBER_bytes * len(places), rows.cast("B")
+    new, set_places, set_values = object.__new__, _set_places, _set_values
+
+    def read(k: int) -> State:
+        state = new(State)
+        set_places(state, places)
+        set_values(state, flat[k * size : k * size + size].tobytes())
+        return state
+
+    return read
 
 
 def time_of(state: State) -> str:

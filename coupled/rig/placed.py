@@ -103,7 +103,9 @@ class Placed:
 class HalfFrames:
     """The frames of a flight in two halves: `begin` and `finish` do what `Placed.frame` does.
 
-    `host_column`, `host` and `loaders` are the same without packing, as in `Placed`.
+    `host_column`, `host` and `loaders` are the same without packing, as in `Placed`. `step_column`
+    finishes frame k and begins the next one: it takes `address`, k, the force on a given column, N,
+    and the longitudinal motion at t_k+1.
     """
 
     def __init__(
@@ -117,7 +119,9 @@ class HalfFrames:
         self._placed, self.address = placed, placed.address
         self._controls, self._record = controls, record
         self._before, self._row = before, row
-        self.host_column, self.host, self._again, self.loaders = _half_kernels()
+        kernels = _half_kernels()
+        self.step_column, self.host_column = kernels.step_column, kernels.host_column
+        self.host, self._again, self.loaders = kernels.host, kernels.again, kernels.loaders
 
     def begin(self, k: int, motion: tuple[float, ...]) -> Commands:
         """Run the host of frame k, which writes row k, and return the surface commands."""
@@ -326,9 +330,37 @@ class Kernels(NamedTuple):
     run_all: Callable[..., Commands]
 
 
+@entry
+def _step_column(
+    address: int,
+    k: int,
+    force: float,
+    pressure: float,
+    load_factor: float,
+    elevator: float,
+    pitch_rate: float,
+    alpha: float,
+    pitch: float,
+    speed: float,
+    altitude: float,
+) -> float:
+    at = carray(pointer(address), _PLACES, np.int64)
+    b = carray(pointer(at[8]), _BESIDE, np.float64)
+    script = carray(pointer(at[2]), (at[1], 2, at[3]), np.float64)
+    begun = k * at[_SUBSTEPS]
+    for node in range(begun + 1, begun + at[_SUBSTEPS] + 1):
+        script[0, 0, node] = force
+    at[_PHASE] = _LOADERS
+    call_at(at[9], address, k)  # with the motion of frame k
+    b[0], b[1], b[2], b[3] = pressure, load_factor, elevator, pitch_rate
+    b[4], b[5], b[6], b[7] = alpha, pitch, speed, altitude
+    return _host_of(address, k + 1, _HOST)
+
+
 class HalfKernels(NamedTuple):
     """The machine code of the entries of a frame's halves."""
 
+    step_column: Callable[..., float]
     host_column: Callable[..., float]
     host: Callable[..., Commands]
     again: Callable[[int, int], Commands]
@@ -348,6 +380,7 @@ def _half_kernels() -> HalfKernels:
     """Return the machine code of the halves; few flights need it."""
     along, whole = (0.0,) * len(LONGITUDINAL), (0.0,) * WHOLE_MOTION
     return HalfKernels(
+        bound(_step_column, 0, 0, 0.0, *along),
         bound(_run_host_column, 0, 0, *along),
         bound(_run_host, 0, 0, *whole),
         bound(_run_again, 0, 0),
