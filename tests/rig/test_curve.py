@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from coupled.errors import InputError
 from coupled.flight.manoeuvre import configure
@@ -17,35 +16,8 @@ from coupled.rig.rigwrite import rig_table, rig_text
 from coupled.rig.standalone import run_control
 from coupled.rig.statics import static_line, static_point
 from coupled.schema import loads_toml
+from tests.support.curves import COLUMN_N, CYCLIC, CYCLIC_N, SCHEDULE, SEGMENT, column, curved
 from tests.support.rigs import BENCH, K_REPORT, bench
-
-SCHEDULE = "controls.column.schedule"
-SEGMENT = 0.001 * np.array([0.0, 20.0, 50.0, 90.0, 130.0, 178.0])  # five, as on a 737's column
-# Stiff near neutral, softer, and stiffer again towards the stop; a row at rest, and one at speed.
-COLUMN_N = [[0.0, 20.0, 35.0, 50.0, 70.0, 110.0], [0.0, 42.0, 84.0, 120.0, 164.0, 260.0]]
-# Of a helicopter's cyclic: flat about the middle, and a push unlike a pull.
-CYCLIC = [-0.15, -0.06, -0.01, 0.0, 0.01, 0.05, 0.12]
-CYCLIC_N = [-60.0, -12.0, 0.0, 0.0, 0.0, 20.0, 48.0]
-
-Floats = NDArray[np.float64]
-
-
-def curved(nodes: Any, forces: Any, changes: dict[str, Any] | None = None) -> Rig:
-    """Return the bench with a curve; one row is the same at any q̄."""
-    pressures = [0.0, 3000.0][: len(forces)]
-    table: dict[str, Any] = {
-        f"{SCHEDULE}.dynamic_pressure_Pa": pressures,
-        f"{SCHEDULE}.deflection_m": [float(node) for node in nodes],
-        f"{SCHEDULE}.force_N": [[float(force) for force in row] for row in forces],
-        f"{SCHEDULE}.total_gradient_N_per_m": [],
-    }
-    return bench(table | (changes or {}))
-
-
-def column(changes: dict[str, Any] | None = None) -> Rig:
-    """Return a 737-like column: five segments, a breakout and friction."""
-    return curved(SEGMENT, COLUMN_N, {"breakout_N": 17.8, "friction_N": 9.0} | (changes or {}))
-
 
 AT = np.concatenate((np.linspace(-0.15, -0.001, 150), np.linspace(0.001, 0.15, 150)))
 TERMS = [("exact", True), ("printed", True), ("exact", False)]
@@ -179,6 +151,7 @@ def test_the_recorded_gradient_is_that_of_the_segment() -> None:
 
 HOSTS: list[dict[str, Any]] = [
     {"breakout_N": 9.0, "friction_N": 2.0},
+    {"breakout_N": 9.0, f"{SCHEDULE}.break_deflection_m": 0.0006},  # within the bend by the 9 N
     {"controls.column.sensing.gradient_skew_s": 0.004},
     {"multiplier": "digital", "controls.column.compensation.missed_share": 0.3},
     {"modifying_lag_s": 0.01, "force_limit_N": 30.0},
@@ -194,13 +167,14 @@ HOSTS: list[dict[str, Any]] = [
 @pytest.mark.parametrize("host", HOSTS)
 def test_a_curve_of_two_segments_moves_as_the_gradients_do(host: dict[str, Any]) -> None:
     """In motion at a changing q̄, and through each part of the host that F_mod passes."""
-    nodes, forces = [0.0, 0.05, 0.1], [[0.0, 28.0, 43.0], [0.0, 109.45, 159.45]]
-    second = {
-        f"{SCHEDULE}.second_gradient_N_per_m": [300.0, 1000.0],
-        f"{SCHEDULE}.break_deflection_m": 0.05,
-    }
+    at = f"{SCHEDULE}.break_deflection_m"
+    second: dict[str, Any] = {f"{SCHEDULE}.second_gradient_N_per_m": [300.0, 1000.0], at: 0.05}
+    second |= host
+    broken = float(second[at])
+    rows = [[0.0, g * broken, g * broken + h * 0.1] for g, h in ((560.0, 300.0), (2189.0, 1000.0))]
+    own = {key: value for key, value in host.items() if key != at}
     runs = []
-    for rig in (curved(nodes, forces, host), bench(host | second)):
+    for rig in (curved([0.0, broken, broken + 0.1], rows, own), bench(second)):
         times = np.arange(60 * rig.substeps + 1) / (rig.frame_rate * rig.substeps)
         force = 80.0 * np.sin(9.0 * times)
         runs.append(run_control(rig, "column", force, np.linspace(500.0, 2900.0, 60)))
