@@ -10,6 +10,9 @@ from __future__ import annotations
 from itertools import pairwise
 from typing import Annotated, Literal
 
+from pydantic import ValidationInfo, field_validator
+from pydantic_core import PydanticCustomError
+
 from coupled.schema import Section, named, quantity, text_like
 
 # A name usable in a file name: letters, digits, dot, dash, underscore.
@@ -87,14 +90,24 @@ class Schedule(Section):
     """
 
     dynamic_pressure: list[float] = quantity("Pa", min_length=1)
-    total_gradient: list[float] = quantity("N_per_{d}", [])
-    second_gradient: list[float] | None = quantity("N_per_{d}", None)
-    break_deflection: float = quantity("{d}", 0.0, ge=0)
     deflection: list[float] | None = quantity("{d}", None)
     force: list[list[float]] | None = quantity("N", None)
+    total_gradient: list[float] = quantity("N_per_{d}", [], validate_default=True)
+    second_gradient: list[float] | None = quantity("N_per_{d}", None)
+    break_deflection: float = quantity("{d}", 0.0, ge=0)
     pressure_scale: float = quantity("", 1.0, gt=0)
     pressure_lag: float = quantity("s", 0.0, ge=0)
     slope: float = quantity("", 1.0, ge=0, le=100)
+
+    @field_validator("total_gradient")
+    @classmethod
+    def _is_given(cls, value: list[float], info: ValidationInfo) -> list[float]:
+        """Refuse a schedule of neither gradients nor a curve."""
+        if not value and all(
+            info.data.get(key, "wrong") is None for key in ("deflection", "force")
+        ):
+            raise PydanticCustomError("missing", "is missing")
+        return value
 
     @property
     def segments(self) -> list[list[float]]:

@@ -402,9 +402,6 @@ def _segments(schedule: Schedule, file: object, key: str, d: str) -> list[tuple[
     """Return the key of each segment's table, and in words where a curve's segment lies."""
     nodes, forces = schedule.deflection, schedule.force
     if nodes is None and forces is None:
-        if not schedule.total_gradient and "total_gradient" not in schedule.model_fields_set:
-            problem = f"{MISSING}; give it, or a curve: deflection_{d} and force_N"
-            raise InputError(file, f"{key}.total_gradient_N_per_{d}", problem)
         both = (f"total_gradient_N_per_{d}", ""), (f"second_gradient_N_per_{d}", "")
         return list(both[: len(schedule.segments)])
     if nodes is None or forces is None:
