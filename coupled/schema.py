@@ -315,6 +315,8 @@ def _refuse_unreal(value: Any, file: object, key: str) -> None:
         for name, one in value.items():
             _refuse_unreal(one, file, f"{key}.{name}")
     for number in value if isinstance(value, list) else [value]:
+        if isinstance(number, list):
+            _refuse_unreal(number, file, key)
         if not isinstance(number, (int, float)):
             continue
         if LARGEST < abs(number) < float("inf"):

@@ -26,7 +26,7 @@ from coupled.flight.runfile import read_run
 from coupled.record.channels import ELEVATOR, LOAD, PRESSURE, ControlName, channel
 from coupled.record.record import Record
 from coupled.resources import aircraft_folder, shipped_runs
-from coupled.rig.equations import bend_loss, specified_gradient
+from coupled.rig.equations import bend_loss, gradient_at_neutral
 from coupled.rig.loader import stop_of
 from coupled.rig.packing import COMMAND_SIGN
 from coupled.rig.rig import Rig
@@ -208,7 +208,7 @@ def _bob_weight(rig: Rig, pressure: Floats) -> Floats:
     """
     control = rig.controls["column"]
     host = control.compensation
-    gradient = specified_gradient(control.schedule, pressure)
+    gradient = gradient_at_neutral(control.schedule, pressure)
     spared = bend_loss(host.bend if host.deflection else 0.0, gradient)
     return np.asarray(control.loader.bob_weight * (1.0 - spared))
 

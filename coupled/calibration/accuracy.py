@@ -74,7 +74,7 @@ def expected(
     `tied`: S₂ was computed from this fit's S₁ by the gain S₁/S₂. None if K·G ≥ 1, where no
     compensation exists.
     """
-    table = control.schedule.total_gradient
+    table = control.schedule.gradients
     bend = fit.line.bend.value
     tried = np.linspace(min(table), max(table), 9)
     if bend_loss(bend, max(table)) >= 1.0:

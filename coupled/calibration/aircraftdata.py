@@ -41,7 +41,7 @@ NOTHING = SweepLeg(np.empty(0), np.empty(0), np.empty(0), read=True)
 
 
 @dataclass(frozen=True)
-class _Row:
+class Row:
     """One reading, SI; `direction` is 0 for the mean of both, `surface` may be NaN."""
 
     number: int
@@ -69,6 +69,18 @@ def read_aircraft_data(
 
     `surface_rad` is the surface's travel for full travel of the control. Raises InputError.
     """
+    rows, found = read_rows(path, control, surface_rad), {}
+    for pressure in sorted({row.pressure for row in rows}):
+        here = [row for row in rows if row.pressure == pressure]
+        found[pressure] = _legs(path, here, specified, surface_rad or np.nan)
+    if len(found) > MOST_PRESSURES:
+        problem = f"is of {len(found)} dynamic pressures; give {MOST_PRESSURES} at most"
+        raise InputError(path, "", problem)
+    return AircraftData(found)
+
+
+def read_rows(path: Path, control: ControlName, surface_rad: float | None) -> list[Row]:
+    """Return a file's readings in their order; `surface_rad` is as for `read_aircraft_data`."""
     lines = rows_of(path)
     if len(lines) < 2:
         raise InputError(path, "", "holds no readings; its first row names the columns")
@@ -80,14 +92,7 @@ def read_aircraft_data(
             problem = f"has {len(cells)} cells, the columns are {len(heads)}"
             raise InputError(path, f"row {number}", problem)
         rows.append(_row(path, number, dict(zip(heads, cells, strict=True)), units))
-    found = {}
-    for pressure in sorted({row.pressure for row in rows}):
-        here = [row for row in rows if row.pressure == pressure]
-        found[pressure] = _legs(path, here, specified, surface_rad or np.nan)
-    if len(found) > MOST_PRESSURES:
-        problem = f"is of {len(found)} dynamic pressures; give {MOST_PRESSURES} at most"
-        raise InputError(path, "", problem)
-    return AircraftData(found)
+    return rows
 
 
 def _units(
@@ -122,7 +127,7 @@ def _units(
 
 def _row(
     path: Path, number: int, cells: dict[str, str], units: dict[str, tuple[str, float]]
-) -> _Row:
+) -> Row:
     value = {
         quantity: number_in(path, number, column, cells[column]) * factor
         for quantity, (column, factor) in units.items()
@@ -137,11 +142,11 @@ def _row(
         raise InputError(path, f"row {number}: {units['pressure'][0]}", "cannot be negative")
     surface = abs(value.get("surface", np.nan))
     way = DIRECTIONS.get(word, 0.0)
-    return _Row(number, pressure, value["deflection"], value["force"], way, surface)
+    return Row(number, pressure, value["deflection"], value["force"], way, surface)
 
 
 def _legs(
-    path: Path, rows: list[_Row], specified: Control, surface_rad: float
+    path: Path, rows: list[Row], specified: Control, surface_rad: float
 ) -> tuple[SweepLeg, ...]:
     """Return the four legs of one q̄; legs without readings are empty."""
     legs = []
@@ -166,7 +171,7 @@ def _legs(
     return tuple(legs)
 
 
-def _check(path: Path, rows: list[_Row], travel: float) -> None:
+def _check(path: Path, rows: list[Row], travel: float) -> None:
     """Raise InputError for impossible rows; rows are of one leg, by absolute deflection."""
     for before, row in zip([None, *rows[:-1]], rows, strict=True):
         if abs(row.deflection) > BEYOND * travel:

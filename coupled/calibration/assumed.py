@@ -28,7 +28,7 @@ def assumed_scales(control: Control) -> Scales:
     travel at the stiffest gradient (the report's 100-V scale factors).
     """
     sensing = control.sensing
-    most = max(control.schedule.total_gradient) * control.travel + control.loader.breakout
+    most = max(control.schedule.gradients) * control.travel + control.loader.breakout
     volts = sensing.full_scale
     force_scale = volts / most if most > 0.0 else 1.0
     s1 = sensing.s1 or volts / control.travel

@@ -116,8 +116,7 @@ def _settling_s(rig: Rig, control: ControlName, precise: bool) -> float:
     """Return the settling time of the control at its softest gradient, s."""
     loader = rig.controls[control].loader
     table = rig.controls[control].schedule
-    slopes = [*table.total_gradient, *(table.second_gradient or ()), loader.basic_gradient]
-    softest = min(slopes)
+    softest = min(loader.basic_gradient, *(min(segment) for segment in table.segments))
     half = 0.5 * loader.damping / loader.mass
     root = half**2 - softest / loader.mass
     slowest = half - math.sqrt(root) if root > 0.0 else half
@@ -244,6 +243,8 @@ def _without_multiplier(rig: Rig, control: ControlName) -> Rig:
             * len(data.schedule.dynamic_pressure),
             f"{place}.schedule.second_gradient_N_per_{d}": None,
             f"{place}.schedule.break_deflection_{d}": 0.0,
+            f"{place}.schedule.deflection_{d}": None,
+            f"{place}.schedule.force_N": None,
             f"{place}.compensation.gradient": False,
         }
     )

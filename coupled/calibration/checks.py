@@ -136,7 +136,8 @@ def static_checks(
     `data` is the specified control.
     """
     found = []
-    straight = data.schedule.break_deflection or data.travel
+    nodes = [abs(node) for node in data.schedule.deflection or () if node != 0.0]
+    straight = min(nodes, default=data.schedule.break_deflection or data.travel)
     for now, wanted, leg in list(zip(felt, specified, LEGS, strict=True))[::2]:
         near = np.abs(wanted.deflection) < LINE[1] * data.travel
         if np.count_nonzero(near) < 2:

@@ -154,7 +154,7 @@ def _most_off(found: CalibrationResult, data: Control) -> tuple[float, float]:
     true, bend = real_scales(data), data.loader.bend
     k, s2 = found.line.bend.value, found.s2_chosen
     assumed = Scales(found.line.s1.value, true.s2 if s2 is None else s2.value, found.fit.s3.value)
-    table, basic = data.schedule.total_gradient, data.loader.basic_gradient
+    table, basic = data.schedule.gradients, data.loader.basic_gradient
     gradients = [float(g) for g in np.linspace(min(table), max(table), 3)]
     made = made_of_asked(assumed, true)
     return (

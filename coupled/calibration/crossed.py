@@ -59,7 +59,7 @@ def crossed_precision(
     Readings are at the design's stations, with the others held as by `crossed_forces`.
     """
     data, scales = rig.controls[control], real_scales(rig.controls[control])
-    bend = data.compensation.bend or USUAL_LOSS / max(data.schedule.total_gradient)
+    bend = data.compensation.bend or USUAL_LOSS / max(data.schedule.gradients)
     delta = np.array([station.deflection for station in design])
     force = np.array([station.force for station in design])
     held = crossed_forces(rig, control, len(design), strongest_N)

@@ -66,7 +66,7 @@ class Precision:
 def gradient_sets(rig: Rig, control: ControlName, count: int) -> list[tuple[float, float]]:
     """Return (q̄ in Pa, G_T in N/d) of evenly spaced gradients over the schedule's range."""
     table = rig.controls[control].schedule
-    pressures, gradients = np.array(table.dynamic_pressure), np.array(table.total_gradient)
+    pressures, gradients = np.array(table.dynamic_pressure), np.array(table.gradients)
     low, high = int(np.argmin(gradients)), int(np.argmax(gradients))
     if gradients[high] <= gradients[low] * (1.0 + 1e-6):
         key = f"controls.{control}.schedule"
@@ -193,7 +193,7 @@ def _rows(
     """Return the whitened derivatives by (a, b, S₃), c, and the K in d/N assumed."""
     data = rig.controls[control]
     scales = real_scales(data)
-    bend = data.compensation.bend or USUAL_LOSS / max(data.schedule.total_gradient)
+    bend = data.compensation.bend or USUAL_LOSS / max(data.schedule.gradients)
     delta = np.array([station.deflection for station in design])
     force = np.array([station.force for station in design])
     read = (volts_of_computed(scales.s1, delta, force, bend), volts(scales.s3, force))
@@ -267,7 +267,7 @@ def _deflection_half_width(rig: Rig, control: ControlName, rows: Floats, bend: f
     if len(rows) < 3:
         return float("inf")
     errors, scales = sandwich(rows, np.zeros(rows.shape[:2])), real_scales(rig.controls[control])
-    table = rig.controls[control].schedule.total_gradient
+    table = rig.controls[control].schedule.gradients
     widths = []
     for g in np.linspace(min(table), max(table), 9):
         lost = bend_loss(bend, float(g))

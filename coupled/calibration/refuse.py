@@ -107,7 +107,7 @@ def _gradients_differ(readings: Readings, instruments: Instruments) -> bool:
 
 def _separating(control: Control, slope: float, strongest: float, d: str) -> str:
     """Return, for a message, the reading that separates S₁ and K best."""
-    gradients = np.array(control.schedule.total_gradient)
+    gradients = np.array(control.schedule.gradients)
     other = float(gradients[np.argmax(np.abs(gradients - slope))])
     if abs(other - slope) < 0.02 * abs(slope):
         return f"the rig's schedule has no other gradient than {slope:.4g} N/{d}: give it one"

@@ -75,6 +75,8 @@ def _specified(data: Control) -> Control:
             total_gradient=table.total_gradient,
             second_gradient=table.second_gradient,
             break_deflection=table.break_deflection,
+            deflection=table.deflection,
+            force=table.force,
         ),
         compensation=Compensation(deflection=True, gradient=True),
         sensing=Sensing(),

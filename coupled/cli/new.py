@@ -1,4 +1,4 @@
-"""The commands `new run`, `sweep`, `map` and `readings`: commented templates."""
+"""The commands `new run`, `sweep`, `map`, `readings` and `feel`: commented templates."""
 
 from __future__ import annotations
 
@@ -8,12 +8,14 @@ from typing import Annotated
 
 import typer
 
-from coupled.cli.app import app
+from coupled.cli.app import UnitsOption, app
 from coupled.cli.progress import progress
 from coupled.cli.rigs import ControlOption, rig_and_control
 from coupled.cli.terminal import say
-from coupled.errors import InputError, nearest
+from coupled.display import in_system
+from coupled.errors import InputError, nearest, shown
 from coupled.files import check_target, read_text, write_text
+from coupled.outputs import Outputs
 from coupled.record.channels import CONTROL_NAMES
 from coupled.resources import shipped_rigs, starter
 
@@ -85,6 +87,52 @@ def readings(
         raise InputError("new readings", "--control", f"no {control!r}; {hint}")
     then = f"coupled calibrate {_word(file)} --rig RIG --control {control}"
     write_new(file, starting_form(control, inches), ".csv", f"fill it in, then: {then}")
+
+
+@new.command(
+    epilog="[dim]Examples: coupled new feel sweep.csv · coupled new feel w.csv w.toml --control"
+    " wheel[/]"
+)
+def feel(
+    readings: Annotated[
+        Path, typer.Argument(help="CSV of deflection and force, out and back, of the aircraft.")
+    ],
+    file: Annotated[Path, typer.Argument(help="The new file; its plot is a PNG beside it.")] = Path(
+        "my-feel.toml"
+    ),
+    control: Annotated[str, typer.Option(help="column, wheel or pedals.")] = "column",
+    units: UnitsOption = "si",
+) -> None:
+    """Write a schedule's curve, breakout and friction from a sweep of the aircraft's control."""
+    from coupled.calibration.feel import feel_text, fit_feel, read_sweep
+    from coupled.plots.feel import draw_sweep
+    from coupled.plots.saving import save
+
+    named = next((name for name in CONTROL_NAMES if name == control), None)
+    if named is None:
+        hint = nearest(control, CONTROL_NAMES)
+        raise InputError("new feel", "--control", f"no {control!r}; {hint}")
+    check_new(file, ".toml")
+    plot = file.with_suffix(".png")
+    check_target(plot, [readings])
+    found = fit_feel(read_sweep(readings, named))
+    text = feel_text(found, named, shown(readings.name))
+    with progress("drawing the plot"), Outputs() as outputs:
+        write_text(outputs.at(file), text)
+        save(draw_sweep(found, named, shown(readings.name), units), outputs.at(plot))
+    newtons = in_system("N", units)
+    for what, value, half in (
+        ("breakout", found.breakout_N, found.breakout_half_width_N),
+        ("friction", found.friction_N, found.friction_half_width_N),
+        ("residual RMS", found.rms_N, 0.0),
+    ):
+        wide = f" ± {newtons.factor * half:.2g}" if half else ""
+        say(f"{what:13}{newtons.factor * value:.4g}{wide} {newtons.unit}")
+    segments = len(found.deflection) - 1
+    sides = "for both sides" if found.deflection[0] == 0.0 else "over both sides"
+    say(f"{'curve':13}{segments} segments {sides}, at {len(found.pressure)} q̄")
+    say(f"written: {file}, {plot}")
+    say(f"next: compare them in {plot.name}, then put the keys of {file.name} in a rig file")
 
 
 def _run_for(rig: str, control: str, file: Path) -> str:

@@ -61,7 +61,7 @@ def _add_inputs(made: Made) -> None:
     system.declare("hand", 0.0, "1: a hand holds the grip at hand-deflection plus axis")
     place = f"hand-deflection-{d}"
     wanted = system.declare(place, 0.0, f"position at which the hand holds the grip, {d}")
-    gains = clamp_gains(made, max(made.control.schedule.total_gradient))
+    gains = clamp_gains(made, max(made.control.schedule.gradients))
     for gain, unit, value in zip(
         ("stiffness", "damping", "integral"),
         (f"N_per_{d}", f"N_s_per_{d}", f"N_per_{d}_s"),

@@ -7,8 +7,7 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
+from coupled.exporting.curve import add_curve, has_curve, sloped
 from coupled.exporting.expression import (
     Expr,
     below,
@@ -50,22 +49,15 @@ def add_schedule(made: Made) -> None:
         lagged = before + made.frame_gain(schedule.pressure_lag) * (got - before)
         got = either(made.own("live"), lagged, got)
     at = made.once_a_frame("schedule/pressure-Pa", got)
+    if has_curve(made):
+        return
     tables = {f"gradient-N_per_{d}": schedule.total_gradient}
     if schedule.second_gradient is not None:
         tables[f"second-gradient-N_per_{d}"] = schedule.second_gradient
     for name, table in tables.items():
-        rest = _at_rest(schedule.dynamic_pressure, table)
-        sloped = [rest + schedule.slope * (value - rest) for value in table]
         says = f"G_T, the specified gradient, N/{d}"
-        looked = looked_up(at, schedule.dynamic_pressure, sloped)
+        looked = looked_up(at, schedule.dynamic_pressure, sloped(schedule, table))
         made.once_a_frame(name, looked, out=says if name.startswith("gradient") else "")
-
-
-def _at_rest(pressures: list[float], table: list[float]) -> float:
-    """Return a table's value at q̄ = 0."""
-    if pressures[0] >= 0.0:
-        return table[0]
-    return float(np.interp(0.0, pressures, table))
 
 
 def add_modification(made: Made, steps: dict[str, tuple[float, float]]) -> None:
@@ -80,6 +72,16 @@ def add_modification(made: Made, steps: dict[str, tuple[float, float]]) -> None:
         *(control.sensing, control.schedule),
     )
     hybrid = loader.multiplier == "hybrid"
+    made_force = 1.0 / sensing.modifying_scale
+    scale = made_force * (sensing.computed_scale if hybrid else 1.0)
+
+    def sent(delta: Expr) -> Expr:
+        return converted(delta, *steps["gradient"]) if hybrid else delta
+
+    if has_curve(made):
+        add_curve(made, scale, sent)
+        _add_offset(made)
+        return
     first = made.own(f"gradient-N_per_{d}")
     two = schedule.second_gradient is not None
     second = made.own(f"second-gradient-N_per_{d}") if two else first
@@ -93,8 +95,6 @@ def add_modification(made: Made, steps: dict[str, tuple[float, float]]) -> None:
         preload = add("host/preload", preload + early * (first - second) * broken)
         first = add("host/first-asked", either(early, second, first))
         edge = either(early, 0.0, edge)
-    made_force = 1.0 / sensing.modifying_scale
-    scale = made_force * (sensing.computed_scale if hybrid else 1.0)
     assumed: Any = bend  # the report's functions work on expressions as on numbers
     asked: dict[str, Any] = {"first": first, "second": second}
     on_computed = {name: total_to_computed(each, assumed) for name, each in asked.items()}
@@ -105,11 +105,16 @@ def add_modification(made: Made, steps: dict[str, tuple[float, float]]) -> None:
         if name == "second" and not two:
             continue
         delta = scale * (gradient - control.assumed_basic_gradient)
-        delta = converted(delta, *steps["gradient"]) if hybrid else delta
-        made.once_a_frame(f"host/{name}", delta)
+        made.once_a_frame(f"host/{name}", sent(delta))
     if schedule.break_deflection > 0.0:
         made.once_a_frame("host/break", edge / (sensing.computed_scale if hybrid else 1.0))
-    if hybrid and (loader.multiplier_offset or loader.multiplier_drift):
+    _add_offset(made)
+
+
+def _add_offset(made: Made) -> None:
+    """Add the offset of an analog multiplier, and its drift."""
+    loader = made.control.loader
+    if loader.multiplier == "hybrid" and (loader.multiplier_offset or loader.multiplier_drift):
         drift = loader.multiplier_drift / made.rig.frame_rate
         frames = either(made.own("live"), made.own("host/frames") + 1.0, 0.0)
         count = made.once_a_frame("host/frames", frames)

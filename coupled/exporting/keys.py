@@ -45,7 +45,7 @@ EXPORTED: Mapping[type[Section], frozenset[str]] = {
     Schedule: frozenset(
         (
             *("dynamic_pressure", "total_gradient", "second_gradient", "break_deflection"),
-            *("pressure_scale", "pressure_lag", "slope"),
+            *("deflection", "force", "pressure_scale", "pressure_lag", "slope"),
         )
     ),
     Compensation: frozenset(

@@ -280,7 +280,7 @@ def _calibrated_low(control: Control, d: str) -> dict[str, float]:
     S₁/(1 + K·G₀). This Ŝ₁ affects the analog product (figure 5) and the host's reading.
     """
     sensing, bend = control.sensing, control.loader.bend
-    low = control.gains.low_gradient or min(control.schedule.total_gradient)
+    low = control.gains.low_gradient or min(control.schedule.gradients)
     kept = 1.0 - bend_loss(bend, felt_gradient(low, bend))
     return {
         f"s1_V_per_{d}": kept * sensing.read_scale * sensing.s1,

@@ -12,7 +12,7 @@ from coupled.gap.thresholds import (
     STAMP_JITTER,
     SHORTEST_RECORD_s,
 )
-from coupled.record.channels import ControlName, channel
+from coupled.record.channels import ControlName, channel, unit_of
 from coupled.record.importing import plausible
 from coupled.record.record import Record
 from coupled.rig.equations import specified_gradient
@@ -26,6 +26,10 @@ def check_record(rig: Rig, record: Record, control: ControlName, file: object) -
     """Refuse a record that cannot be held against this rig, and say why."""
     if control not in rig.controls:
         raise InputError(file, control, f"the rig has no {control}")
+    if rig.controls[control].schedule.deflection is not None:
+        key = f"controls.{control}.schedule.force_N"
+        problem = "is a curve, which a diagnosis does not model; give total_gradient_N_per_"
+        raise InputError(rig.name, key, f"{problem}{unit_of(control)}")
     time = record.time_s
     steps = np.diff(time)
     rate = 1.0 / float(np.median(steps))

@@ -38,6 +38,10 @@ def open_link(url: str, rig: Rig, lockstep: bool, deflection: bool) -> Link | No
         return open_cls2sim(url, rig)
     scheme, host, port = split_address(url)
     if scheme == "udp":
+        for name, control in rig.controls.items():
+            if control.schedule.force is not None:
+                problem = "the open protocol orders two gradients; it has no curve to order"
+                raise InputError("--loader", str(name), problem)
         return UdpLink(host, port, rig, deflection, lockstep)
     raise InputError("--loader", "", f"is {url!r}; {nearest(scheme, ('sim', 'udp', 'cls2sim'))}")
 

@@ -37,6 +37,16 @@ class Losses:
     implausible: list[dict[str, Any]] = field(default_factory=list)
 
 
+def chord(modification: Any, travel: float) -> float:
+    """Return F_mod of a curve at full travel over the travel, N/d, on its stiffer side."""
+    page = modification["page"]
+    at, force, slope = (modification[f"node_{part}"][page] for part in ("at", "force", "slope"))
+    last = np.count_nonzero(at <= travel, axis=1) - 1
+    sides = np.arange(2)
+    reached = force[sides, last] + slope[sides, last] * (travel - at[sides, last])
+    return float(np.max(reached)) / travel
+
+
 class Attached:
     """The loader on `link`; `warn` receives urgent messages for the pilot."""
 
@@ -56,6 +66,7 @@ class Attached:
             Limiter(limits, control.travel, self.frame_s, link.ordered_gradient(i))
             for i, control in enumerate(controls)
         ]
+        self._travels = [control.travel for control in controls]
         self._plausible = [Plausibility(c, self.frame_s, link.measures_force) for c in controls]
         self._faults: list[dict[str, Any] | None] = [None] * len(controls)
         self._fade = Fade(limits.fade_s, self.frame_s)
@@ -195,9 +206,12 @@ class Attached:
         for i, limiter in enumerate(self._limiters):
             m = controls["state"]["modification"][i]
             own = self.link.own_load(i, self._measured[i].computed)
+            first, second = float(m["first"]), float(m["second"])
+            if m["curved"]:
+                first = second = chord(m, self._travels[i])
             asked = Order(
-                float(m["first"]),
-                float(m["second"]),
+                first,
+                second,
                 float(m["break_computed"]),
                 float(m["breakout"]),
                 float(row[self._force_at[i]]) + own,

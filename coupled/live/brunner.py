@@ -6,10 +6,13 @@ import math
 from collections.abc import Mapping
 from urllib.parse import parse_qsl, urlsplit
 
+import numpy as np
+
 from coupled.errors import InputError, nearest
 from coupled.live.cls2sim import External, Version2
 from coupled.live.link import Link
 from coupled.live.transport import Given, Transport
+from coupled.rig.parameters import Control
 from coupled.rig.rig import Rig
 
 _WORDS = ("protocol", "transport", "counts_per_N", "turn", "profile_N_per_d", "scale")
@@ -57,12 +60,30 @@ def _given(words: Mapping[str, str], rig: Rig, protocol: str) -> Given:
         problem = "no source that we have gives the rudder's bit of v2; fly the others"
         raise InputError("--loader", "pedals", problem)
     for name, data in rig.controls.items():
+        if data.schedule.force is not None:
+            _check_profile(data, str(name))
         if data.schedule.second_gradient or data.loader.breakout:
             problem = "v2 scales one gradient; it has no second one and no breakout to order"
             raise InputError("--loader", str(name), problem)
     profile = _number(words, "profile_N_per_d", "the gradient of the loader's own force profile")
     scale = _number(words, "scale", "the scale factor at which the profile has that gradient")
     return Given(counts, turn, profile, scale)
+
+
+def _check_profile(data: Control, name: str) -> None:
+    """Refuse a curve that is not the loader's own force profile times a factor over q̄.
+
+    Within 1 % of the largest force at each q̄, less than a step of the scale factor.
+    """
+    force = np.array(data.schedule.force)
+    shape = force[np.argmax(np.abs(force).max(axis=1))]
+    scaled = np.outer(force @ shape / (shape @ shape), shape)
+    if np.any(np.abs(force - scaled) > 0.01 * np.abs(force).max(axis=1, keepdims=True)):
+        problem = "v2 scales one force profile; give a curve whose rows are proportional"
+        raise InputError("--loader", name, problem)
+    if data.compensation.gradient and data.compensation.bend > 0.0:
+        problem = "v2 scales a force profile over δc, which compensation.gradient would bend;"
+        raise InputError("--loader", name, f"{problem} give false")
 
 
 def _number(words: Mapping[str, str], word: str, why: str) -> float:

@@ -127,7 +127,7 @@ class Host:
         known = [(name, c) for name, c in pairs if measured and c.compensation.bend > 0.0]
         self.service = {name: BendEstimator(control, self.frame_s) for name, control in known}
         self._adaptations = {
-            name: Adaptation(control.compensation.bend, max(control.schedule.total_gradient))
+            name: Adaptation(control.compensation.bend, max(control.schedule.gradients))
             for name, control in known
             if plan.adapt
         }

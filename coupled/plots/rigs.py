@@ -1,15 +1,20 @@
-"""A rig: the gradient that it gives over dynamic pressure, and what its bend would take."""
+"""A rig: the gradient that it gives over dynamic pressure, and what its bend would take.
+
+Of a specified curve: the force over deflection, specified and felt, at its lowest and highest q̄.
+"""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
+from coupled.flight.manoeuvre import configure
 from coupled.plots.pages import BLUE, ORANGE, plain
-from coupled.record.channels import unit_of
+from coupled.record.channels import ControlName, unit_of
 from coupled.rig.equations import specified_gradient, uncompensated_loss
+from coupled.rig.statics import static_line
 
 if TYPE_CHECKING:
     from coupled.rig.rig import Rig
@@ -20,12 +25,15 @@ _POINTS = 200
 def draw_rig(rig: Rig) -> Figure:
     """Draw each control's G_T over q̄, and the share that its bend takes without a correction."""
     rig.check_controlled(rig.file)
-    rows = len(rig.controls)
+    rows, curves = len(rig.controls), [name for name in rig.controls if _curved(rig, name)]
     figure = Figure(figsize=(8.2, 0.7 + 2.2 * rows), layout="constrained")
-    grid = figure.subplots(rows, 2, squeeze=False, sharex=True)
+    grid = figure.subplots(rows, 2, squeeze=False, sharex=not curves)
     highest = max(max(control.schedule.dynamic_pressure) for control in rig.controls.values())
     pressure = np.linspace(0.0, highest, _POINTS)
     for (left, right), (name, control) in zip(grid, rig.controls.items(), strict=True):
+        if name in curves:
+            _draw_curve(left, right, rig, name)
+            continue
         gradient = specified_gradient(control.schedule, pressure)
         left.plot(pressure / 1000.0, gradient, color=BLUE)
         left.set_ylabel(f"{name}: G_T, N/{unit_of(name)}")
@@ -35,8 +43,36 @@ def draw_rig(rig: Rig) -> Figure:
         for axes in (left, right):
             axes.set_ylim(bottom=0.0)
             axes.grid(alpha=0.25)
-    for axes in grid[-1]:
+    straight = [grid[k] for k, name in enumerate(rig.controls) if name not in curves]
+    for axes in np.ravel(straight if curves else grid[-1]):
         axes.set_xlabel("q̄, kPa")
         axes.set_xlim(0.0, highest / 1000.0)
     figure.suptitle(plain(f"{rig.name}: gradient, and what the bend takes", 60), fontsize=12)
     return figure
+
+
+def _curved(rig: Rig, name: ControlName) -> bool:
+    return rig.controls[name].schedule.deflection is not None
+
+
+def _draw_curve(left: Any, right: Any, rig: Rig, name: ControlName) -> None:
+    """Draw a control's curve beside what is felt, and the share lost without a correction."""
+    control, d = rig.controls[name], unit_of(name)
+    uncorrected = configure(rig, "uncompensated")
+    computed = control.travel * np.linspace(-1.0, 1.0, _POINTS)
+    pressures = control.schedule.dynamic_pressure
+    for pressure, color in zip(sorted({pressures[0], pressures[-1]}), (BLUE, ORANGE), strict=False):
+        felt = static_line(rig, name, pressure, computed)
+        bare = static_line(uncorrected, name, pressure, computed)
+        label = f"{pressure / 1000.0:.3g} kPa"
+        left.plot(felt.deflection, felt.specified, color="0.65", linewidth=4.0, zorder=0)
+        left.plot(felt.deflection, felt.force, color=color, label=f"felt at {label}")
+        lost = 100.0 * (1.0 - bare.estimate / bare.deflection)
+        right.plot(bare.deflection, lost, color=color, label=label)
+    left.plot([], [], color="0.65", linewidth=4.0, label="specified")
+    left.set_ylabel(f"{name}: F, N")
+    right.set_ylabel("lost uncorrected, %")
+    for axes in (left, right):
+        axes.set_xlabel(f"δ, {d}")
+        axes.grid(alpha=0.25)
+        axes.legend(fontsize=8)

@@ -48,13 +48,16 @@ def rig_report(rig: Rig, made: Made) -> Report:
 def _numbers(name: str, control: Control) -> Iterator[tuple[str, str]]:
     """Yield a control's main numbers, each with its label and unit."""
     d, loader, host = unit_of(name), control.loader, control.compensation
-    gradients = control.schedule.total_gradient
+    gradients = control.schedule.gradients
     yield "travel", f"±{control.travel:.4g} {d}"
     yield "mass", f"{loader.mass:.4g} kg"
     yield "damping", f"{loader.damping:.4g} N·s/{d}"
     yield "breakout", f"{loader.breakout:.4g} N"
     yield "friction", f"{loader.friction:.4g} N"
-    yield "gradient G_T", f"{min(gradients):.4g} to {max(gradients):.4g} N/{d}"
+    what = (
+        "gradient G_T" if control.schedule.deflection is None else "steepest gradient of the curve"
+    )
+    yield what, f"{min(gradients):.4g} to {max(gradients):.4g} N/{d}"
     yield "bend K", f"{loader.bend:.4g} {d}/N"
     yield "  lost at most, uncorrected", percent(uncompensated_loss(loader.bend, max(gradients)))
     yield "host's K̂", f"{host.bend:.4g} {d}/N"

@@ -28,10 +28,22 @@ N = TypeVar("N", float, Floats)
 def specified_gradient(schedule: Schedule, pressure_Pa: N) -> N:
     """Return the G_T in N/d of a rig's table at q̄; of the shape of q̄.
 
-    Linear between the table's rows and constant beyond; below the break, if there is one. The
-    table as filed: faults of its use (`slope`, `pressure_scale`) are left out.
+    Linear between the table's rows and constant beyond; below the break, if there is one, and the
+    steepest of a curve. The table as filed: faults of its use (`slope`, `pressure_scale`) are left
+    out.
     """
-    return _looked_up(schedule.dynamic_pressure, schedule.total_gradient, pressure_Pa)
+    return _looked_up(schedule.dynamic_pressure, schedule.gradients, pressure_Pa)
+
+
+def gradient_at_neutral(schedule: Schedule, pressure_Pa: N) -> N:
+    """Return G_T in N/d at q̄ beside neutral: of a curve, on the softer side.
+
+    As `specified_gradient`, which it is without a curve.
+    """
+    nodes, segments = schedule.deflection, schedule.segments
+    beside = [0] if nodes is None else [max(nodes.index(0.0) - 1, 0), nodes.index(0.0)]
+    softer = [min(row) for row in zip(*(segments[k] for k in beside), strict=True)]
+    return _looked_up(schedule.dynamic_pressure, softer, pressure_Pa)
 
 
 def second_gradient(schedule: Schedule, pressure_Pa: N) -> N:
@@ -45,16 +57,41 @@ def specified_force(
 ) -> Floats:
     """Return the force in N specified at δ in d: eq. (6), with breakout and two segments.
 
-    F_BO + G₁·δ up to the break δ₁, and the slope G₂ beyond (appendix C); odd in δ.
+    F_BO + G₁·δ up to the break δ₁, and the slope G₂ beyond (appendix C), odd in δ; or F_BO and the
+    curve.
     """
     data = rig.controls[cast(ControlName, control)]
     pressure = np.asarray(pressure_Pa, dtype=float)
+    if data.schedule.deflection is not None:
+        preload = np.sign(deflection) * data.loader.breakout
+        return np.asarray(preload + curve_force(data.schedule, pressure, deflection))
     first = specified_gradient(data.schedule, pressure)
     second = second_gradient(data.schedule, pressure)
     size, at = np.abs(deflection), data.schedule.break_deflection
     beyond = np.maximum(size - at, 0.0) if at else 0.0
     slope_part = first * (size - beyond) + second * beyond
     return np.asarray(np.sign(deflection) * (data.loader.breakout + slope_part))
+
+
+def curve_force(schedule: Schedule, pressure_Pa: float | Floats, deflection: Floats) -> Floats:
+    """Return the force in N beyond the breakout that a curve specifies at δ in d.
+
+    Linear between the deflections, and beyond them at the slope of the last segment. The table as
+    filed: faults of its use are left out.
+    """
+    nodes, rows = np.array(schedule.deflection or []), np.array(schedule.force or [])
+    size = np.abs(deflection) if nodes[0] == 0.0 else np.asarray(deflection)
+    pressure, size = np.broadcast_arrays(np.asarray(pressure_Pa, dtype=float), size)
+    node = np.clip(np.searchsorted(nodes, size, "right") - 1, 0, len(nodes) - 2)
+    share = (size - nodes[node]) / np.diff(nodes)[node]
+    at_rows = rows[:, node] + share * np.diff(rows, axis=1)[:, node]
+    pressures = np.array(schedule.dynamic_pressure)
+    place = np.interp(pressure, pressures, np.arange(len(pressures)))
+    row = np.minimum(place.astype(int), max(len(pressures) - 2, 0))
+    above = np.minimum(row + 1, len(pressures) - 1)
+    low, high = (np.take_along_axis(at_rows, r[None], 0)[0] for r in (row, above))
+    force = low + (place - row) * (high - low)
+    return np.asarray(np.sign(deflection) * force if nodes[0] == 0.0 else force)
 
 
 def _looked_up(pressures: list[float], gradients: list[float], pressure_Pa: N) -> N:

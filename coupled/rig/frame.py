@@ -22,8 +22,11 @@ from coupled.rig.loader import start_loader
 from coupled.rig.mechanism import begin_frame, run_frame, run_node, set_hand
 from coupled.rig.modification import (
     ModificationState,
+    convert_curve,
     keep_last,
+    local_gradient,
     modifying_force,
+    set_curve,
     set_gradients,
 )
 from coupled.rig.reach import free, stop_again
@@ -54,6 +57,9 @@ def set_product(
         m.held = converted(product, p.sensing.product_step, p.sensing.product_range)
         return m.held
     step, full = p.sensing.gradient_step, p.sensing.gradient_range
+    if m.curved:
+        convert_curve(m, step, full)
+        return modifying_force(m, computed)
     m.first = converted(m.first, step, full)
     m.second = converted(m.second, step, full)
     return modifying_force(m, computed)
@@ -102,6 +108,10 @@ def host_frame(
         first *= 1.0 - s.services.feel_lost
         second *= 1.0 - s.services.feel_lost
     set_gradients(p.modification, m, first, second)
+    if p.schedule.nodes > 0:
+        share = 1.0 - s.services.feel_lost if s.services.on else 1.0
+        set_curve(p.modification, m, p.schedule, s.schedule.pressure, share)
+        first = local_gradient(p.modification, m, host.computed - neutral)
     set_inertia(p.inertia, s.inertia, p.loader, s.loader, first)
     product = set_product(p, m, computed - neutral, host.computed - neutral)
     if not missed:

@@ -36,7 +36,7 @@ def growth(rig: Rig, hand: Hand, seconds: float) -> float:
     frames = max(_LEAST_FRAMES, math.ceil(seconds * rig.frame_rate))
     (name, control), *others = rig.controls.items()
     assert not others
-    stiffness = control.loader.basic_gradient + max(control.schedule.total_gradient)
+    stiffness = control.loader.basic_gradient + max(control.schedule.gradients)
     packed = pack(rig, {name: hand})
     logs = np.empty(frames)
     rate = math.sqrt(stiffness / control.loader.mass)

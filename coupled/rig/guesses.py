@@ -18,6 +18,7 @@ _NAMED = 3  # guesses of a control that a sentence names, the weightiest first
 _WORDS = {
     "loader.bend": "K",
     "schedule.total_gradient": "the gradients",
+    "schedule.force": "the forces",
     "travel": "travel",
     "loader.breakout": "breakout",
     "loader.friction": "friction",

@@ -24,6 +24,15 @@ segment, so that G₂ applies from there on and F_extra adds the rest,
 Below that force the loader is at neutral and the grip moves by the bend alone, δ = K·F, whatever is
 specified: no F_mod(δc) can change it.
 
+A specified curve is the same with any number of segments. On each side of neutral the nodes (δ, F)
+become (δc, F_mod) with δc = δ − K·F, and eq. (12) gives the slope of each segment:
+
+    F_mod = F_BO + f(δ̂) − (F_BO + G_B·δc),    δ̂ = δc + K·F
+
+Segments within the bend by the breakout are omitted, and F_extra is F − F_BO at δc = 0. If it
+differs between the two sides, half of the difference is added to the offset. K·G < 1 for each
+segment, so δc rises with δ (`rig` checks it).
+
 The host commands ΔF in volts, v₂ = S₂·ΔF, so an error of S₂ scales the force. With the analog
 multiplier (figures 3 and 5) the host sends ΔG, scaled by Ŝ₂/Ŝ₁, and the product uses v₁ = S₁·δc,
 eq. (2). So an error of the electronics' S₁ is felt,
@@ -40,14 +49,24 @@ frame. The host's output may be late by a part of the frame; until then the last
 
 from __future__ import annotations
 
+import math
 from typing import Protocol
 
+import numpy as np
+from numpy.typing import NDArray
+
 from coupled.rig import equations
-from coupled.rig.compiled import layout, stage
+from coupled.rig.compiled import layout, seldom, stage
 from coupled.rig.declaration import Declaration, Given
+from coupled.rig.parameters import MAX_NODES
+from coupled.rig.schedule import ScheduleParameters, force_at
+from coupled.rig.sensing import converted
+
+Floats = NDArray[np.float64]
 
 computed_deflection = stage(equations.computed_deflection)  # eq. (1)
 total_to_computed = stage(equations.total_to_computed)  # eq. (12), without its − G_B
+felt_gradient = stage(equations.felt_gradient)  # its inverse
 
 
 class ModificationParameters(Protocol):
@@ -83,6 +102,11 @@ class ModificationState(Protocol):
     last_breakout: float
     last_held: float
     last_offset: float
+    curved: int  # a curve is specified, in place of `first`, `second` and `break_computed`
+    page: int  # of this frame in the three arrays, the other being the last frame's
+    node_at: Floats  # |δc| where a segment begins, d, by page and side, pull first; infinite: none
+    node_force: Floats  # F_mod there without breakout and offset, N, positive along δc
+    node_slope: Floats  # dF_mod/dδc of the segment, N/d
 
 
 def _analog(g: Given) -> float:
@@ -111,9 +135,13 @@ MODIFICATION = Declaration(
         "drift": lambda g: _analog(g) * g.control.loader.multiplier_drift * g.frame_s,
         "late": lambda g: min(round(g.control.sensing.gradient_skew / g.substep_s), g.substeps - 1),
     },
-    state=layout(ModificationState),
+    state=layout(
+        ModificationState,
+        **dict.fromkeys(("node_at", "node_force", "node_slope"), (2, 2, MAX_NODES)),
+    ),
     fixed=(
         *("first", "second", "break_computed", "breakout", "offset"),
+        *("node_at", "node_force", "node_slope"),
         *("last_first", "last_second", "last_break_computed", "last_breakout", "last_offset"),
     ),
 )
@@ -165,9 +193,126 @@ def set_gradients(
     s.break_computed /= p.multiplied
 
 
+@seldom
+def set_curve(
+    p: ModificationParameters,
+    s: ModificationState,
+    schedule: ScheduleParameters,
+    pressure: float,
+    share: float,
+) -> None:
+    """Set the modification for a share of the curve at the schedule's pressure in Pa.
+
+    It follows `set_gradients`, which sets the offset.
+    """
+    s.curved = 1
+    up = _set_side(p, s, schedule, pressure, share, 1.0)
+    down = _set_side(p, s, schedule, pressure, share, -1.0)
+    if p.exact:
+        s.breakout = p.made * (0.5 * (up + down) - p.breakout)
+        s.offset += p.made * 0.5 * (up - down)
+
+
+@stage
+def _set_side(
+    p: ModificationParameters,
+    s: ModificationState,
+    schedule: ScheduleParameters,
+    pressure: float,
+    share: float,
+    side: float,
+) -> float:
+    """Set the nodes on one side of neutral; return the size of F at δc = 0 there, N."""
+    bend, made = assumed_bend(p), p.made * p.multiplied
+    row = 0 if side > 0.0 else 1
+    at, forces = s.node_at[s.page, row], s.node_force[s.page, row]
+    slopes = s.node_slope[s.page, row]
+    last, step = schedule.nodes - 1, 1 if side > 0.0 else -1
+    mirrored = schedule.deflection[0] == 0.0
+    node = 0
+    if mirrored:
+        step = 1
+    else:
+        while schedule.deflection[node] != 0.0:
+            node += 1
+    begun, size = p.breakout if p.exact else 0.0, 0.0
+    computed, force, at_neutral, count = computed_deflection(size, begun, bend), 0.0, begun, 0
+    while True:
+        after = node + step
+        ends = after in (0, last)
+        wide = abs(schedule.deflection[after]) - size
+        rise = abs(force_at(schedule, after, pressure)) - abs(force_at(schedule, node, pressure))
+        total = total_to_computed(share * rise / wide, bend)
+        size, begun = size + wide, begun + share * rise
+        reached = computed_deflection(size, begun, bend)
+        if reached > 0.0 or ends:
+            if count == 0:
+                at_neutral = begun - total * reached
+                computed = 0.0
+            at[count], forces[count] = computed / p.multiplied, force
+            slopes[count] = made * (total - p.basic_gradient)
+            force += slopes[count] * (reached - computed) / p.multiplied
+            computed = reached
+            count += 1
+        if ends:
+            break
+        node = after
+    for unused in range(count, MAX_NODES):
+        at[unused] = math.inf
+    return at_neutral
+
+
+@seldom
+def convert_curve(s: ModificationState, step: float, full_scale: float) -> None:
+    """Send the slopes of a curve through the host's converter."""
+    if step == 0.0:
+        return
+    for side in range(2):
+        at, forces = s.node_at[s.page, side], s.node_force[s.page, side]
+        slopes = s.node_slope[s.page, side]
+        for node in range(MAX_NODES):
+            slopes[node] = converted(slopes[node], step, full_scale)
+            if node + 1 < MAX_NODES and at[node + 1] < math.inf:
+                forces[node + 1] = forces[node] + slopes[node] * (at[node + 1] - at[node])
+
+
+@seldom
+def local_gradient(p: ModificationParameters, s: ModificationState, computed: float) -> float:
+    """Return the specified curve's G_T at δc in d, N/d: the inverse of eq. (12)."""
+    at_computed = slope(s, computed) / (p.made * p.multiplied) + p.basic_gradient
+    return felt_gradient(at_computed, assumed_bend(p))
+
+
+@stage
+def _segment(s: ModificationState, computed: float) -> tuple[int, int]:
+    """Return side and number of the curve's segment at δc in d."""
+    side, size = 0 if computed >= 0.0 else 1, abs(computed)
+    node = 0
+    while node + 1 < MAX_NODES and s.node_at[s.page, side, node + 1] <= size:
+        node += 1
+    return side, node
+
+
+@seldom
+def _along_curve(s: ModificationState, computed: float) -> float:
+    """Return F_mod of a curve in N, without breakout and offset, at δc in d."""
+    side, node = _segment(s, computed)
+    beyond = abs(computed) - s.node_at[s.page, side, node]
+    force = s.node_force[s.page, side, node] + s.node_slope[s.page, side, node] * beyond
+    return float(-force if side else force)
+
+
+@seldom
+def _slope_of_curve(s: ModificationState, computed: float) -> float:
+    """Return dF_mod/dδc of a curve at δc in d, N/d."""
+    side, node = _segment(s, computed)
+    return float(s.node_slope[s.page, side, node])
+
+
 @stage
 def keep_last(s: ModificationState) -> None:
     """Store the values at the end of a frame, for a host with a late output."""
+    s.page = 1 - s.page
     s.last_first, s.last_second, s.last_break_computed = s.first, s.second, s.break_computed
     s.last_breakout, s.last_held, s.last_offset = s.breakout, s.held, s.offset
 
@@ -175,6 +320,7 @@ def keep_last(s: ModificationState) -> None:
 @stage
 def exchange_last(s: ModificationState) -> None:
     """Exchange this frame's output and the last one's."""
+    s.page = 1 - s.page
     s.first, s.last_first = s.last_first, s.first
     s.second, s.last_second = s.last_second, s.second
     s.break_computed, s.last_break_computed = s.last_break_computed, s.break_computed
@@ -186,6 +332,8 @@ def exchange_last(s: ModificationState) -> None:
 @stage
 def smooth_force(s: ModificationState, computed: float) -> float:
     """Return F_mod in N without its breakout, at δc in d: eq. (11), two segments, with offset."""
+    if s.curved:
+        return s.offset + _along_curve(s, computed)
     force = s.first * computed + s.offset
     if s.break_computed > 0.0:
         beyond = abs(computed) - s.break_computed
@@ -198,6 +346,8 @@ def smooth_force(s: ModificationState, computed: float) -> float:
 @stage
 def slope(s: ModificationState, computed: float) -> float:
     """Return dF_mod/dδc in N/d."""
+    if s.curved:
+        return _slope_of_curve(s, computed)
     if s.break_computed > 0.0 and abs(computed) > s.break_computed:
         return s.second
     return s.first

@@ -7,9 +7,11 @@ effect out. Signs: pull, clockwise and right foot forward are positive.
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, ValidationInfo, field_validator
+from pydantic_core import PydanticCustomError
 
 from coupled.schema import Section, named, quantity, text_like
 
@@ -24,6 +26,7 @@ PlainName = Annotated[
     ),
 ]
 MAX_ROWS = 32  # of a schedule's table
+MAX_NODES = 64  # deflections of a curve
 DELAY_SLOTS = 1024  # of the loader's force history, in substeps; a power of two
 GAUGE_SLOTS = 256  # of the gauge's, likewise
 SERVO_DAMPING_RATIO = 0.7  # usual; of a servo that a fit adds to a rig without one
@@ -80,15 +83,50 @@ class Loader(Section):
 
 
 class Schedule(Section):
-    """Gradient over dynamic pressure, and faults of its use."""
+    """Force over deflection and dynamic pressure, and faults of its use.
+
+    One or two gradients at each pressure, or a curve: forces beyond the breakout at `deflection`,
+    a row for each pressure. A curve that begins at zero is odd in the deflection.
+    """
 
     dynamic_pressure: list[float] = quantity("Pa", min_length=1)
-    total_gradient: list[float] = quantity("N_per_{d}")
+    deflection: list[float] | None = quantity("{d}", None)
+    force: list[list[float]] | None = quantity("N", None)
+    total_gradient: list[float] = quantity("N_per_{d}", [], validate_default=True)
     second_gradient: list[float] | None = quantity("N_per_{d}", None)
     break_deflection: float = quantity("{d}", 0.0, ge=0)
     pressure_scale: float = quantity("", 1.0, gt=0)
     pressure_lag: float = quantity("s", 0.0, ge=0)
     slope: float = quantity("", 1.0, ge=0, le=100)
+
+    @field_validator("total_gradient")
+    @classmethod
+    def _is_given(cls, value: list[float], info: ValidationInfo) -> list[float]:
+        """Refuse a schedule of neither gradients nor a curve."""
+        if not value and all(
+            info.data.get(key, "wrong") is None for key in ("deflection", "force")
+        ):
+            raise PydanticCustomError("missing", "is missing")
+        return value
+
+    @property
+    def segments(self) -> list[list[float]]:
+        """The gradient of each segment at each pressure, N/d."""
+        if self.deflection is None or self.force is None:
+            first, second = self.total_gradient, self.second_gradient
+            return [first] if second is None else [first, second]
+        nodes = list(zip(self.deflection, zip(*self.force, strict=True), strict=True))
+        return [
+            [(f1 - f0) / (d1 - d0) for f0, f1 in zip(low, high, strict=True)]
+            for (d0, low), (d1, high) in pairwise(nodes)
+        ]
+
+    @property
+    def gradients(self) -> list[float]:
+        """G_T at each pressure, N/d: up to the break, or the steepest gradient of a curve."""
+        if self.deflection is None:
+            return self.total_gradient
+        return [max(row) for row in zip(*self.segments, strict=True)]
 
 
 class Compensation(Section):

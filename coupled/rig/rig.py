@@ -17,7 +17,7 @@ from typing import Any, ClassVar
 from pydantic import PrivateAttr, ValidationError
 
 from coupled.arguments import public
-from coupled.errors import InputError, MissingKeyError, nearest, shown_value
+from coupled.errors import MISSING, InputError, MissingKeyError, nearest, shown_value
 from coupled.files import check_target, write_text
 from coupled.record.channels import (
     CONTROL_NAMES,
@@ -27,7 +27,14 @@ from coupled.record.channels import (
 )
 from coupled.results import Result
 from coupled.rig.guesses import check_guesses
-from coupled.rig.parameters import DELAY_SLOTS, GAUGE_SLOTS, MAX_ROWS, Control
+from coupled.rig.parameters import (
+    DELAY_SLOTS,
+    GAUGE_SLOTS,
+    MAX_NODES,
+    MAX_ROWS,
+    Control,
+    Schedule,
+)
 from coupled.rig.rigdata import RigData
 from coupled.rig.rigedit import updated
 from coupled.rig.rigwrite import rig_text
@@ -351,9 +358,7 @@ def _check_schedule(control: Control, file: object, path: str, d: str) -> None:
         raise InputError(file, f"{key}.dynamic_pressure_Pa", f"has more than {MAX_ROWS} rows")
     if any(b <= a for a, b in pairwise(pressures)):
         raise InputError(file, f"{key}.dynamic_pressure_Pa", "must rise from value to value")
-    tables = {f"total_gradient_N_per_{d}": schedule.total_gradient}
-    if schedule.second_gradient is not None:
-        tables[f"second_gradient_N_per_{d}"] = schedule.second_gradient
+    tables = _segments(schedule, file, key, d)
     if (schedule.second_gradient is None) != (schedule.break_deflection == 0.0):
         raise InputError(
             file,
@@ -367,7 +372,7 @@ def _check_schedule(control: Control, file: object, path: str, d: str) -> None:
             f"{path}.loader.bend_{d}_per_N": control.loader.bend,
             f"{path}.loader.bend_push_{d}_per_N": control.loader.bend_push or 0.0,
         }
-    for table_key, gradient in tables.items():
+    for (table_key, between), gradient in zip(tables, schedule.segments, strict=True):
         if len(gradient) != len(pressures):
             raise InputError(
                 file,
@@ -376,17 +381,64 @@ def _check_schedule(control: Control, file: object, path: str, d: str) -> None:
             )
         sloped = [gradient[0] + schedule.slope * (g - gradient[0]) for g in gradient]
         if min(sloped) < 0.0:
-            raise InputError(file, f"{key}.{table_key}", "a gradient cannot be negative")
+            lowest = pressures[sloped.index(min(sloped))]
+            problem = (
+                f"falls{between} at {lowest:g} Pa; a force may not fall as the deflection rises"
+            )
+            problem = problem if between else "a gradient cannot be negative"
+            raise InputError(file, f"{key}.{table_key}", problem)
         for bend_key, bend in bends.items():
             if bend * max(sloped) >= 1.0:
                 where = pressures[sloped.index(max(sloped))]
+                limit = f"its gradient{between}" if between else table_key
                 raise InputError(
                     file,
-                    bend_key,
-                    f"K·G_T = {bend * max(sloped):.3g} at {where:g} Pa: no gradient stiffer than"
-                    f" the structure can be given; K must stay below {1.0 / max(sloped):.3g}"
-                    f" {d}/N, or {table_key} below {1.0 / bend:.4g}",
+                    f"{key}.{table_key}" if between else bend_key,
+                    f"K·G_T = {bend * max(sloped):.3g} at {where:g} Pa{between}: no gradient"
+                    " stiffer than the structure can be given; K must stay below"
+                    f" {1.0 / max(sloped):.3g} {d}/N, or {limit} below {1.0 / bend:.4g}"
+                    f"{f' N/{d}' if between else ''}",
                 )
+
+
+def _segments(schedule: Schedule, file: object, key: str, d: str) -> list[tuple[str, str]]:
+    """Return the key of each segment's table, and in words where a curve's segment lies."""
+    nodes, forces = schedule.deflection, schedule.force
+    if nodes is None and forces is None:
+        both = (f"total_gradient_N_per_{d}", ""), (f"second_gradient_N_per_{d}", "")
+        return list(both[: len(schedule.segments)])
+    if nodes is None or forces is None:
+        lacking = "force_N" if forces is None else f"deflection_{d}"
+        problem = f"{MISSING}; a curve needs both deflection_{d} and force_N"
+        raise InputError(file, f"{key}.{lacking}", problem)
+    if schedule.total_gradient or schedule.second_gradient or schedule.break_deflection:
+        problem = "is a curve beside gradients; give either force_N, or total_gradient_N_per_"
+        raise InputError(file, f"{key}.force_N", f"{problem}{d} and what belongs to it")
+    _check_nodes(nodes, file, f"{key}.deflection_{d}")
+    if len(forces) != len(schedule.dynamic_pressure):
+        rows = len(schedule.dynamic_pressure)
+        problem = f"has {len(forces)} rows, dynamic_pressure_Pa {rows} values; give as many"
+        raise InputError(file, f"{key}.force_N", problem)
+    for pressure, row in zip(schedule.dynamic_pressure, forces, strict=True):
+        if len(row) != len(nodes):
+            problem = f"has {len(row)} values at {pressure:g} Pa, deflection_{d} {len(nodes)}"
+            raise InputError(file, f"{key}.force_N", f"{problem}; give as many")
+        if (begun := row[nodes.index(0.0)]) != 0.0:
+            problem = f"is {begun:g} N at neutral, at {pressure:g} Pa; give 0 there"
+            raise InputError(file, f"{key}.force_N", f"{problem}: breakout_N is the loader's")
+    ends = [f" between {low:g} and {high:g} {d}" for low, high in pairwise(nodes)]
+    return [("force_N", words) for words in ends]
+
+
+def _check_nodes(nodes: list[float], file: object, key: str) -> None:
+    """Refuse deflections of a curve that do not rise through, or from, zero."""
+    if len(nodes) > MAX_NODES:
+        raise InputError(file, key, f"has more than {MAX_NODES} values")
+    if any(b <= a for a, b in pairwise(nodes)):
+        raise InputError(file, key, "must rise from value to value")
+    if 0.0 not in nodes or nodes[-1] == 0.0:
+        problem = "should rise from 0, for the same curve to both sides, or from below through 0"
+        raise InputError(file, key, problem)
 
 
 def _check_converters(control: Control, file: object, path: str, d: str) -> None:

@@ -1,8 +1,10 @@
-"""Schedule: from dynamic pressure to the specified gradient.
+"""Schedule: from dynamic pressure to the specified gradient, or to the specified curve.
 
 G_T(q̄) is interpolated linearly in the rig's table and constant beyond its ends. A second table
-gives the gradient beyond a break in deflection (appendix C of the report). Faults: the schedule's
-pressure lags or is wrong by a factor, or the table's rise above its value at q̄ = 0 is.
+gives the gradient beyond a break in deflection (appendix C of the report). A curve is a table of
+forces over q̄ and deflection; the force at each of its deflections is interpolated in the same way.
+Faults: the schedule's pressure lags or is wrong by a factor, or the table's rise above its value at
+q̄ = 0 is.
 """
 
 from __future__ import annotations
@@ -13,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.rig.compiled import layout, stage
-from coupled.rig.declaration import Declaration, first_order_gain
-from coupled.rig.parameters import MAX_ROWS
+from coupled.rig.declaration import Declaration, Given, first_order_gain
+from coupled.rig.parameters import MAX_NODES, MAX_ROWS
 
 Table = NDArray[np.float64]
 
@@ -26,6 +28,9 @@ class ScheduleParameters(Protocol):
     dynamic_pressure: Table  # Pa, rising
     total_gradient: Table  # G_T, N/d
     second_gradient: Table  # slope beyond the break, N/d; equal to the first if there is none
+    nodes: int  # deflections of the curve; 0 without one
+    deflection: Table  # of the curve, d, rising; from zero if it is odd
+    force: Table  # of the curve, N, a row for each deflection over the pressures
     pressure_scale: float  # q̄ in the schedule over the real one
     pressure_lag_gain: float  # 1 − exp(−T/τ) over a frame; 1 without lag
     slope: float  # factor on the rise above the value at q̄ = 0
@@ -38,14 +43,28 @@ class ScheduleState(Protocol):
     pressure: float  # Pa
 
 
-def _rows(values: list[float]) -> Table:
+def _rows(values: list[float], length: int = MAX_ROWS) -> Table:
     """Return a table's column at its full length, with zeros after its last row."""
-    column = np.zeros(MAX_ROWS)
+    column = np.zeros(length)
     column[: len(values)] = values
     return column
 
 
-_SHAPES = dict.fromkeys(("dynamic_pressure", "total_gradient", "second_gradient"), (MAX_ROWS,))
+def _forces(given: Given) -> Table:
+    """Return a curve's forces, N, a row for each deflection."""
+    force = given.control.schedule.force
+    if force is None:
+        return _NO_FORCES
+    table = np.zeros((MAX_NODES, MAX_ROWS))
+    table[: len(force[0]), : len(force)] = np.transpose(force)
+    return table
+
+
+_NO_FORCES = np.zeros((MAX_NODES, MAX_ROWS))
+_SHAPES: dict[str, tuple[int, ...]] = {
+    **dict.fromkeys(("dynamic_pressure", "total_gradient", "second_gradient"), (MAX_ROWS,)),
+    **{"deflection": (MAX_NODES,), "force": (MAX_NODES, MAX_ROWS)},
+}
 SCHEDULE = Declaration(
     layout(ScheduleParameters, **_SHAPES),
     section="control.schedule",
@@ -56,6 +75,9 @@ SCHEDULE = Declaration(
         "second_gradient": lambda g: _rows(
             g.control.schedule.second_gradient or g.control.schedule.total_gradient
         ),
+        "nodes": lambda g: len(g.control.schedule.deflection or ()),
+        "deflection": lambda g: _rows(g.control.schedule.deflection or [], MAX_NODES),
+        "force": _forces,
         "pressure_lag_gain": lambda g: first_order_gain(g.control.schedule.pressure_lag, g.frame_s),
     },
     state=layout(ScheduleState),
@@ -80,6 +102,12 @@ def gradients(p: ScheduleParameters, pressure: float) -> tuple[float, float]:
     first = _interpolate(p, p.total_gradient, pressure)
     second = _interpolate(p, p.second_gradient, pressure)
     return first, second
+
+
+@stage
+def force_at(p: ScheduleParameters, node: int, pressure: float) -> float:
+    """Return the curve's force at one of its deflections, N, at the schedule's pressure in Pa."""
+    return _interpolate(p, p.force[node], pressure)
 
 
 @stage

@@ -34,7 +34,12 @@ from coupled.rig.control import ControlArray, ControlParameters, ControlState
 from coupled.rig.crossing import leaks
 from coupled.rig.equations import basic_force, specified_force
 from coupled.rig.linkage import LinkageParameters, bend, contact_displacement
-from coupled.rig.modification import set_gradients, smooth_force
+from coupled.rig.modification import (
+    convert_curve,
+    set_curve,
+    set_gradients,
+    smooth_force,
+)
 from coupled.rig.packing import crossed_bends, pack
 from coupled.rig.rig import Rig
 from coupled.rig.schedule import gradients
@@ -168,9 +173,14 @@ def _set(p: ControlParameters, s: ControlState, pressure: float) -> float:
     """Set the modification of the state's frame; return δc as read over δc."""
     m, sensing = s.modification, p.sensing
     read = scale_at(sensing, m.frames)
-    first, second = gradients(p.schedule, p.schedule.pressure_scale * pressure)
+    seen = p.schedule.pressure_scale * pressure
+    first, second = gradients(p.schedule, seen)
     set_gradients(p.modification, m, first, second)
-    if p.modification.digital == 0:
+    if p.schedule.nodes > 0:
+        set_curve(p.modification, m, p.schedule, seen, 1.0)
+    if m.curved and p.modification.digital == 0:
+        convert_curve(m, sensing.gradient_step, sensing.gradient_range)
+    elif p.modification.digital == 0:
         m.first = converted(m.first, sensing.gradient_step, sensing.gradient_range)
         m.second = converted(m.second, sensing.gradient_step, sensing.gradient_range)
     return read

@@ -166,10 +166,9 @@ def _check_gradients(structure: Structure, controls: Mapping[str, Control], file
 
 def _stiffest(control: Control, pressure_Pa: float) -> float:
     schedule = control.schedule
-    tables = [schedule.total_gradient, schedule.second_gradient or schedule.total_gradient]
     return max(
         float(np.interp(pressure_Pa, schedule.dynamic_pressure, table)) * max(schedule.slope, 1.0)
-        for table in tables
+        for table in schedule.segments
     )
 
 

@@ -47,6 +47,7 @@ RIG = bench(
     }
 )
 COLUMN = RIG.controls["column"]
+CURVE = {"deflection": [0.0, 0.1], "force": [[0.0, 9.0], [0.0, 20.0]]}  # in place of gradients
 
 
 def other(value: Any) -> Any:
@@ -80,7 +81,10 @@ def with_other(section: Section, path: tuple[str, ...]) -> Section:
     """Return a section with the value at a path another one."""
     values = {name: getattr(section, name) for name in type(section).model_fields}
     first, *rest = path
-    values[first] = with_other(values[first], tuple(rest)) if rest else other(values[first])
+    if rest:
+        values[first] = with_other(values[first], tuple(rest))
+    else:
+        values[first] = CURVE[first] if values[first] is None else other(values[first])
     return type(section)(**values)
 
 

@@ -28,7 +28,7 @@ from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import Manoeuvre
 from coupled.flight.pilot import Step
 from coupled.flight.response import Response, elevator_response
-from coupled.rig.equations import specified_gradient
+from coupled.rig.equations import gradient_at_neutral
 from coupled.rig.packing import COMMAND_SIGN
 from coupled.rig.rig import Rig
 
@@ -82,7 +82,7 @@ def bob_weight_limit(rig: Rig, file: Path) -> tuple[float, float] | None:
     """
     response = _response(rig, file)
     pressure = response(float(_RATES_rad_per_s[0])).pressure_Pa
-    gradient = specified_gradient(rig.controls["column"].schedule, pressure)
+    gradient = gradient_at_neutral(rig.controls["column"].schedule, pressure)
     linear = hands_off_rig(rig, 0.0, gradient)
 
     def turn(rate: float) -> float:
@@ -105,7 +105,7 @@ def flown_limit(rig: Rig, file: Path, near_N_per_g: float, rate_rad_per_s: float
     of `near`.
     """
     pressure = _response(rig, file)(float(_RATES_rad_per_s[0])).pressure_Pa
-    gradient = specified_gradient(rig.controls["column"].schedule, pressure)
+    gradient = gradient_at_neutral(rig.controls["column"].schedule, pressure)
 
     def growth(weight: float) -> float:
         return flown_growth(hands_off_rig(rig, weight, gradient), rate_rad_per_s)

@@ -118,11 +118,7 @@ def filed(rig: Rig, name: ControlName, kind: Kind) -> float | None:
 def gradient_range(control: Control) -> tuple[float, float]:
     """Return the softest and stiffest gradient of a schedule, N/d."""
     table = control.schedule
-    every = [
-        g[0] + table.slope * (value - g[0])
-        for g in (table.total_gradient, table.second_gradient or table.total_gradient)
-        for value in g
-    ]
+    every = [g[0] + table.slope * (value - g[0]) for g in table.segments for value in g]
     return min(every), max(every)
 
 

@@ -152,6 +152,8 @@ def _linear(rig: Rig, name: ControlName, gradient: float) -> Rig:
         "compensation.breakout_N": 0.0,
         "sensing.word_length_bits": 0,
         f"schedule.second_gradient_N_per_{d}": None,
+        f"schedule.deflection_{d}": None,
+        "schedule.force_N": None,
         "compensation.mass_factor": None,
         "compensation.damping_factor": None,
         f"loader.bend_push_{d}_per_N": None,

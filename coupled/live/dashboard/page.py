@@ -92,7 +92,7 @@ class Page:
                     "unit": "rad" if name == "wheel" else "m",
                     "travel": control.travel,
                     "pressure_Pa": control.schedule.dynamic_pressure,
-                    "gradient": control.schedule.total_gradient,
+                    "gradient": control.schedule.gradients,
                 }
                 for name, control in rig.controls.items()
             ],

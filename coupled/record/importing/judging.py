@@ -160,7 +160,8 @@ def _filed_gradient(record: Mapping[str, Floats], data: Control | None) -> Float
         return None
     if "dynamic_pressure_Pa" in record:
         return specified_gradient(data.schedule, record["dynamic_pressure_Pa"])
-    first, *rest = data.schedule.total_gradient
-    if data.schedule.second_gradient is not None or any(each != first for each in rest):
+    segments = data.schedule.segments
+    first, *rest = segments[0]
+    if len(segments) > 1 or any(each != first for each in rest):
         return None
     return np.full(next(iter(record.values())).size, first)

@@ -1,0 +1,273 @@
+"""A force-deflection sweep of an aircraft as breakout, friction and curve.
+
+A slow sweep out and back at the dynamic pressures q̄_i gives
+
+    F = F_BO·sgn(δ) + f(δ, q̄_i) + F_c·sgn(δ')
+
+f is linear between nodes, rises with δ and is 0 at neutral. For given nodes F is linear in F_BO,
+F_c and the rises between the nodes, none of which is negative: non-negative least squares (Lawson
+and Hanson, Solving Least Squares Problems, 1974, ch. 23). Nodes of an even grid are removed one by
+one, and the others moved, as far as the Bayesian information criterion falls. The same criterion
+decides between one curve for both sides and two. Readings near neutral, where the breakout may hold
+any force, and at turning points, where the friction reverses, are not used.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import nnls
+from scipy.stats import t as student
+
+from coupled.calibration.aircraftdata import Row, read_rows
+from coupled.errors import InputError
+from coupled.record.channels import ControlName, unit_of
+
+Floats = NDArray[np.float64]
+NEUTRAL = 0.01  # of the largest deflection: readings nearer to neutral are not used
+TURNS = 0.02  # of the range of deflections: a smaller reversal is noise of a reading
+GRID = 12  # nodes on a side to begin with
+MOVES = (0.5, 0.25, 0.125, 0.0625)  # of the grid's step
+EXACT = 1e-9  # of the largest force: a smaller residual is rounding
+LEAST_READINGS = 8
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """The readings of a sweep in SI: δ in d, F in N, q̄ in Pa; `motion` is sgn(δ')."""
+
+    deflection: Floats
+    force: Floats
+    pressure: Floats
+    motion: Floats
+
+
+@dataclass(frozen=True)
+class Feel:
+    """Breakout and friction in N with half of their 95 % intervals, and the curve's table.
+
+    `force` in N has a row for each of `pressure` in Pa, over `deflection` in d. `rms_N` is that of
+    the residual; `used` are the readings used.
+    """
+
+    breakout_N: float
+    breakout_half_width_N: float
+    friction_N: float
+    friction_half_width_N: float
+    pressure: Floats
+    deflection: Floats
+    force: Floats
+    rms_N: float
+    sweep: Sweep
+    used: NDArray[np.bool_]
+
+    def at(self, deflection: Floats, row: int, motion: float) -> Floats:
+        """Return the fitted force in N at δ in d, at one of the pressures; motion −1, 0 or 1."""
+        odd = self.deflection[0] == 0.0
+        size = np.abs(deflection) if odd else deflection
+        curve = np.interp(size, self.deflection, self.force[row])
+        side = np.sign(deflection)
+        return np.asarray(side * self.breakout_N + (side if odd else 1.0) * curve) + (
+            motion * self.friction_N
+        )
+
+
+def read_sweep(path: Path, control: ControlName) -> Sweep:
+    """Return the readings of a file; without a column `direction`, in the order of the sweep.
+
+    Raises InputError.
+    """
+    rows = read_rows(path, control, np.nan)
+    columns = np.array([(row.deflection, row.force, row.pressure) for row in rows]).T
+    deflection, force, pressure = columns
+    given = [row for row in rows if row.direction]
+    if given and len(given) < len(rows):
+        number = next(row.number for row in rows if not row.direction)
+        problem = "names no direction, unlike others; give out or back in each row, or in none"
+        raise InputError(path, f"row {number}", problem)
+    if given:
+        motion = np.array([row.direction for row in rows]) * np.sign(deflection)
+    else:
+        motion = np.zeros(len(rows))
+        for q in np.unique(pressure):
+            motion[pressure == q] = _motion(deflection[pressure == q])
+    found = Sweep(deflection, force, pressure, motion)
+    _check(path, rows, found)
+    return found
+
+
+def _motion(deflection: Floats) -> Floats:
+    """Return the direction of the motion at each reading, 0 at the turning points."""
+    least = TURNS * float(np.ptp(deflection))
+    turns, extreme, way = [0], 0, 0.0
+    for k, value in enumerate(deflection):
+        away = value - deflection[extreme]
+        if way * away > 0.0 or (way == 0.0 and abs(away) > least):
+            way = way or float(np.sign(away))
+            extreme = k
+        elif way * away < -least:
+            turns.append(extreme)
+            way, extreme = -way, k
+    turns.append(len(deflection) - 1)
+    motion = np.zeros(len(deflection))
+    for begun, ended in pairwise(turns):
+        motion[begun + 1 : ended] = np.sign(deflection[ended] - deflection[begun])
+    return motion
+
+
+def _check(path: Path, rows: Sequence[Row], sweep: Sweep) -> None:
+    """Refuse readings that do not determine friction and curve."""
+    outward = sweep.motion * np.sign(sweep.deflection)
+    for q in np.unique(sweep.pressure):
+        here = sweep.pressure == q
+        where = f" at {q:g} Pa" if np.ptp(sweep.pressure) > 0.0 else ""
+        if np.count_nonzero(here) < LEAST_READINGS:
+            problem = f"holds {np.count_nonzero(here)} readings{where}; {LEAST_READINGS} are needed"
+            raise InputError(path, "", problem)
+        for way, word in ((1.0, "out"), (-1.0, "back")):
+            if not np.any(outward[here] == way):
+                problem = f"holds no reading on the way {word}{where}; sweep out and back"
+                raise InputError(path, "", f"{problem}: half their difference is the friction")
+    pull = sweep.deflection * sweep.force
+    if float(np.sum(pull)) <= 0.0:
+        problem = "has forces against the deflections; a pull is positive in both"
+        raise InputError(path, f"row {rows[int(np.argmin(pull))].number}", problem)
+
+
+def fit_feel(sweep: Sweep) -> Feel:
+    """Return breakout, friction and curve of a sweep."""
+    most = float(np.max(np.abs(sweep.deflection)))
+    used = (np.abs(sweep.deflection) > NEUTRAL * most) & (sweep.motion != 0.0)
+    both = bool(np.any(sweep.deflection[used] > 0.0) and np.any(sweep.deflection[used] < 0.0))
+    found = [_Fit(sweep, used, odd) for odd in ((True, False) if both else (True,))]
+    best = min(found, key=lambda fit: fit.criterion)
+    return best.feel()
+
+
+class _Fit:
+    """The best nodes of a sweep, for one curve for both sides (`odd`), or for two."""
+
+    def __init__(self, sweep: Sweep, used: NDArray[np.bool_], odd: bool) -> None:
+        self._sweep, self._used, self._odd = sweep, used, odd
+        self._pressures = np.unique(sweep.pressure)
+        at = np.abs(sweep.deflection[used]) if odd else sweep.deflection[used]
+        self._at, self._force = at, sweep.force[used]
+        ends = [end for end in (float(np.min(at)), float(np.max(at))) if end < 0.0 or end > 0.0]
+        ends = ends[-1:] if odd else ends
+        inner = [end * k / GRID for end in ends for k in range(1, GRID)]
+        self._step = max(map(abs, ends)) / GRID
+        self._ends = frozenset(ends)
+        self._nodes = sorted({0.0, *inner, *ends})
+        self.criterion = self._try(self._nodes)
+        self._remove()
+        self._move()
+        self._remove()
+
+    def _design(self, nodes: Sequence[float]) -> Floats:
+        """Return the derivatives of the readings by F_BO, F_c, and each rise at each q̄."""
+        sweep, used = self._sweep, self._used
+        side = np.sign(sweep.deflection[used])
+        columns = [side, sweep.motion[used]]
+        zero = nodes.index(0.0)
+        for k, (low, high) in enumerate(pairwise(nodes)):
+            inside = np.clip((self._at - low) / (high - low), 0.0, 1.0)
+            share = inside if k >= zero else inside - 1.0
+            share = side * share if self._odd else share
+            for q in self._pressures:
+                columns.append(share * (sweep.pressure[used] == q))
+        return np.stack(columns, axis=1)
+
+    def _solve(self, nodes: Sequence[float]) -> tuple[Floats, Floats]:
+        design = self._design(nodes)
+        values, _ = nnls(design, self._force)
+        return values, self._force - design @ values
+
+    def _try(self, nodes: Sequence[float]) -> float:
+        """Return the Bayesian information criterion of some nodes."""
+        values, residual = self._solve(nodes)
+        count = len(residual)
+        least = (EXACT * float(np.max(np.abs(self._force)))) ** 2
+        # A node that is not on the grid's ends is a parameter too.
+        free = len(values) + len(nodes) - 1 - len(self._ends)
+        return float(
+            count * np.log(np.mean(residual**2) + least) + min(free, count - 1) * np.log(count)
+        )
+
+    def _remove(self) -> None:
+        """Remove the nodes without which the criterion is lower, the most needless first."""
+        while True:
+            inner = [node for node in self._nodes if node != 0.0 and node not in self._ends]
+            tried = [[each for each in self._nodes if each != node] for node in inner]
+            scores = [self._try(nodes) for nodes in tried]
+            if not scores or min(scores) > self.criterion:
+                return
+            self.criterion = min(scores)
+            self._nodes = tried[int(np.argmin(scores))]
+
+    def _move(self) -> None:
+        """Move each inner node while the criterion falls."""
+        for share in MOVES:
+            while sum(self._moved(k, share * self._step) for k in range(len(self._nodes))):
+                pass
+
+    def _moved(self, k: int, by: float) -> bool:
+        if self._nodes[k] == 0.0 or self._nodes[k] in self._ends:
+            return False
+        for way in (-by, by):
+            nodes = [*self._nodes[:k], self._nodes[k] + way, *self._nodes[k + 1 :]]
+            if nodes[k - 1] + 0.5 * by < nodes[k] < nodes[k + 1] - 0.5 * by:
+                score = self._try(nodes)
+                if score < self.criterion - 1e-9 * abs(self.criterion):
+                    self.criterion, self._nodes = score, nodes
+                    return True
+        return False
+
+    def feel(self) -> Feel:
+        """Return the fit at these nodes."""
+        values, residual = self._solve(self._nodes)
+        design = self._design(self._nodes)
+        active = values > 0.0
+        freedom = max(len(residual) - int(np.count_nonzero(active)), 1)
+        variance = float(residual @ residual) / freedom
+        spread = np.zeros(len(values))
+        inverse = np.linalg.pinv(design[:, active].T @ design[:, active])
+        spread[active] = np.sqrt(variance * np.diag(inverse))
+        wide = float(student.ppf(0.975, freedom)) * spread
+        rises = values[2:].reshape(len(self._nodes) - 1, len(self._pressures)).T
+        zero = self._nodes.index(0.0)
+        force = np.concatenate((np.zeros((len(rises), 1)), np.cumsum(rises, axis=1)), axis=1)
+        force -= force[:, [zero]]
+        return Feel(
+            *(float(values[0]), float(wide[0]), float(values[1]), float(wide[1])),
+            *(self._pressures, np.array(self._nodes), force, float(np.sqrt(variance))),
+            *(self._sweep, self._used),
+        )
+
+
+def feel_text(feel: Feel, control: ControlName, source: str) -> str:
+    """Return the keys of a rig file: loader's breakout and friction, and the schedule."""
+    d = unit_of(control)
+
+    def listed(values: Floats) -> str:
+        return "[" + ", ".join(repr(float(f"{value:.5g}") + 0.0) for value in values) + "]"
+
+    rows = ",\n  ".join(listed(row) for row in feel.force)
+    return f"""# Breakout, friction and curve of {source}, for a rig file in place of its own keys.
+# The residual of the readings is {feel.rms_N:.3g} N RMS.
+
+[controls.{control}.loader]
+breakout_N = {feel.breakout_N:.4g}  # ± {feel.breakout_half_width_N:.2g}, 95 %
+friction_N = {feel.friction_N:.4g}  # ± {feel.friction_half_width_N:.2g}, 95 %
+
+[controls.{control}.schedule]
+dynamic_pressure_Pa = {listed(feel.pressure)}
+deflection_{d} = {listed(feel.deflection)}
+force_N = [
+  {rows},
+]
+"""

@@ -1,0 +1,131 @@
+"""Breakout, friction and curve from a measured sweep, recovered from simulated readings."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from coupled.calibration.feel import Feel, fit_feel, read_sweep
+from coupled.errors import InputError
+from coupled.rig.equations import specified_force
+from coupled.rig.rigfile import rig_from_table
+from coupled.schema import load_toml
+from tests.support.commands import coupled
+from tests.support.rigs import BENCH
+
+Floats = NDArray[np.float64]
+BREAKOUT_N, FRICTION_N, NOISE_N = 17.8, 9.0, 0.5
+NODES = np.array([0.0, 0.02, 0.05, 0.09, 0.13, 0.178])
+FORCES = {0.0: [0.0, 20.0, 35.0, 50.0, 70.0, 110.0], 3000.0: [0.0, 42.0, 84.0, 120.0, 164.0, 260.0]}
+CYCLIC = np.array([-0.15, -0.06, -0.01, 0.0, 0.01, 0.05, 0.12])
+CYCLIC_N = np.array([-60.0, -12.0, 0.0, 0.0, 0.0, 20.0, 48.0])
+HEADS = "dynamic_pressure_Pa,deflection_m,force_N"
+
+
+def swept(low: float, high: float, readings: int = 160) -> tuple[Floats, Floats]:
+    """Return δ and the direction of a sweep from neutral to both ends and back."""
+    turns = np.array([0.0, high, low, 0.0])
+    way = np.concatenate(([0.0], np.cumsum(np.abs(np.diff(turns)))))
+    at = np.interp(np.linspace(0.0, way[-1], readings), way, turns)
+    return at, np.sign(np.gradient(at))
+
+
+def column_sweep(folder: Path, noise: float = NOISE_N, heads: str = HEADS) -> Path:
+    """Write the sweeps of a 737-like column, read in the order of the sweep."""
+    rng, lines = np.random.default_rng(7), [heads]
+    for pressure, forces in FORCES.items():
+        at, motion = swept(-NODES[-1], NODES[-1])
+        felt = np.sign(at) * (BREAKOUT_N + np.interp(np.abs(at), NODES, forces))
+        felt += FRICTION_N * motion + noise * rng.standard_normal(len(at))
+        lines += [f"{pressure},{d:.5f},{f:.3f}" for d, f in zip(at, felt, strict=True)]
+    path = folder / "sweep.csv"
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path
+
+
+def fitted(path: Path) -> Feel:
+    return fit_feel(read_sweep(path, "column"))
+
+
+def test_a_columns_breakout_friction_and_five_segments_are_recovered(tmp_path: Path) -> None:
+    found = fitted(column_sweep(tmp_path))
+    assert found.breakout_N == pytest.approx(BREAKOUT_N, abs=2.0 * found.breakout_half_width_N)
+    assert found.friction_N == pytest.approx(FRICTION_N, abs=2.0 * found.friction_half_width_N)
+    assert found.breakout_half_width_N < 0.6
+    assert found.friction_half_width_N < 0.1
+    assert found.rms_N == pytest.approx(NOISE_N, rel=0.12)
+    assert found.deflection[:-1] == pytest.approx(NODES[:-1], abs=0.002)  # of five segments
+    for row, forces in zip(found.force, FORCES.values(), strict=True):
+        there = np.linspace(0.005, 0.17, 40)
+        ours = BREAKOUT_N + np.interp(there, NODES, forces)
+        theirs = found.breakout_N + np.interp(there, found.deflection, row)
+        assert theirs == pytest.approx(ours, abs=1.0)
+
+
+def test_exact_readings_give_the_exact_curve(tmp_path: Path) -> None:
+    found = fitted(column_sweep(tmp_path, noise=0.0))
+    assert found.breakout_N == pytest.approx(BREAKOUT_N, abs=0.05)
+    assert found.friction_N == pytest.approx(FRICTION_N, abs=0.02)
+    assert found.rms_N < 0.1
+
+
+def test_a_cyclic_flat_about_the_middle_is_unlike_on_its_two_sides(tmp_path: Path) -> None:
+    rng, lines = np.random.default_rng(3), ["deflection_m,force_N,direction"]
+    at, motion = swept(CYCLIC[0], CYCLIC[-1])
+    felt = np.interp(at, CYCLIC, CYCLIC_N) + 2.0 * motion + 0.2 * rng.standard_normal(len(at))
+    for d, f, way in zip(at, felt, motion * np.sign(at), strict=True):
+        if d != 0.0:
+            lines.append(f"{d:.5f},{f:.3f},{'out' if way > 0.0 else 'back'}")
+    path = tmp_path / "cyclic.csv"
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    found = fitted(path)
+    assert found.deflection[0] < 0.0 < found.deflection[-1]
+    assert found.breakout_N < 0.3
+    assert found.friction_N == pytest.approx(2.0, abs=0.1)
+    there = np.linspace(-0.14, 0.11, 60)
+    ours = np.interp(there, CYCLIC, CYCLIC_N)
+    assert found.at(there, 0, 0.0) == pytest.approx(ours, abs=0.6)
+
+
+@pytest.mark.parametrize(
+    ("lines", "key", "said"),
+    [
+        (["0,0.01,5"] * 4, "", "holds 4 readings; 8 are needed"),
+        ([f"0,{0.01 * k},{9 * k}" for k in range(1, 10)], "", "on the way back; sweep out and"),
+        (
+            [f"0,{d},{-300 * d}" for d in (*np.arange(1, 9) / 90, *np.arange(7, 0, -1) / 90)],
+            "row 9",
+            "has forces against the deflections",
+        ),
+    ],
+)
+def test_readings_that_decide_nothing_are_one_line(
+    tmp_path: Path, lines: list[str], key: str, said: str
+) -> None:
+    path = tmp_path / "sweep.csv"
+    path.write_text("\n".join([HEADS, *lines]) + "\n", encoding="utf-8")
+    with pytest.raises(InputError) as refused:
+        read_sweep(path, "column")
+    assert refused.value.key == key
+    assert said in refused.value.problem
+
+
+def test_the_command_writes_a_schedule_that_a_rig_takes(tmp_path: Path) -> None:
+    column_sweep(tmp_path)
+    done = coupled(tmp_path, "new", "feel", "sweep.csv", "feel.toml")
+    assert done.returncode == 0, done.stderr
+    assert "curve        5 segments for both sides, at 2 q̄" in done.stdout
+    assert (tmp_path / "feel.png").stat().st_size > 10_000
+    keys = load_toml(tmp_path / "feel.toml")["controls"]["column"]
+    data = BENCH["controls"]["column"]
+    whole = data | {"schedule": keys["schedule"], "loader": data["loader"] | keys["loader"]}
+    rig = rig_from_table(BENCH | {"controls": {"column": whole}}, "test")
+    felt = specified_force(rig, "column", 3000.0, np.array([0.1]))
+    assert felt == pytest.approx(BREAKOUT_N + np.interp(0.1, NODES, FORCES[3000.0]), abs=1.0)
+    assert rig.controls["column"].loader.friction == pytest.approx(FRICTION_N, abs=0.2)
+    again = coupled(tmp_path, "new", "feel", "sweep.csv", "feel.toml")
+    assert again.returncode == 2
+    assert "is there already" in again.stderr
