@@ -21,5 +21,8 @@ def test_its_friction_is_found_where_none_is_filed() -> None:
     found = diagnose(axis_rig(), {"r": axis(seconds=40.0)})
     assert found.verdict == "effect"
     [effect] = found.effects
-    assert effect.name == "coulomb_friction"
+    assert effect.name == "presliding_friction"  # its bristles of 1e6 N/m yield by 20 μm
     assert effect.value == pytest.approx(20.0, rel=0.03)
+    stiffness = next(p for p in effect.parameters if p.name == "stiffness_N_per_m")
+    assert stiffness.low is not None and stiffness.high is not None
+    assert stiffness.low < 1e6 < stiffness.high
