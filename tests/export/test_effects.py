@@ -167,8 +167,8 @@ SECTIONS: dict[str, type[Section]] = {
 
 
 def test_every_key_that_is_said_to_be_exported_is_held_here() -> None:
-    """But for a control's switches and its bob weight, which flights of their own hold."""
-    elsewhere = {"deflection", "gradient", "bob_weight"}
+    """But for a control's switches, bob weight and curve, which flights of their own hold."""
+    elsewhere = {"deflection", "gradient", "bob_weight", "force"}
     for name, section in SECTIONS.items():
         keys = {field: key for key, field in file_keys(section, "m").items()}
         held = {key.rpartition(".")[2] for key in EFFECTS if f".{name}." in key}
