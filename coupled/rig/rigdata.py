@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from coupled.arguments import public
 from coupled.errors import InputError
 from coupled.record.channels import ControlName
 from coupled.rig.parameters import Control, Flight, PlainName
@@ -20,6 +21,7 @@ class RigData(Section):
     noise: dict[str, float] = {}
     structure: Structure = Structure()
 
+    @public
     def check_controlled(self, file: object = None) -> None:
         """Refuse a rig without a control; `file` is named in the fault, by default the rig."""
         if not self.controls:

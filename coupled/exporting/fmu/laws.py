@@ -15,7 +15,7 @@ from coupled.rig.control import STAGES
 from coupled.rig.declaration import first_order_gain
 from coupled.rig.friction import CONTACT_DAMPING
 from coupled.rig.loader import stop_of
-from coupled.rig.parameters import Control
+from coupled.rig.parameters import Compensation, Control
 from coupled.rig.surface import COMMAND_SIGN
 
 PRODUCT, GAIN, LARGER, STOP, LEAD, ANY, ROOT = range(7)
@@ -110,14 +110,17 @@ def _unchanged(control: Control) -> dict[str, Law]:
     return found
 
 
+def _assumed(host: Compensation, name: str) -> Law:
+    """Return the law of a number that the host assumes, by default the loader's own."""
+    return _same(f"{'loader' if getattr(host, name) is None else 'compensation'}.{name}")
+
+
 def _of_host(control: Control, frame_s: float) -> dict[str, Law]:
     host, analog = control.compensation, control.loader.multiplier == "hybrid"
-    gradient = "loader" if host.basic_gradient is None else "compensation"
-    breakout = "loader" if host.breakout is None else "compensation"
     found = {
         "schedule.pressure_lag_gain": Law(GAIN, frame_s, ("schedule.pressure_lag",)),
-        "modification.basic_gradient": _same(f"{gradient}.basic_gradient"),
-        "modification.breakout": _same(f"{breakout}.breakout"),
+        "modification.basic_gradient": _assumed(host, "basic_gradient"),
+        "modification.breakout": _assumed(host, "breakout"),
         "modification.break_deflection": _same("schedule.break_deflection"),
         "modification.compensated": _same("compensation.gradient"),
         "modification.made": _inverse("sensing.modifying_scale"),
