@@ -7,13 +7,13 @@ from os import PathLike, fspath
 from pathlib import Path
 
 from coupled.arguments import public
-from coupled.errors import InputError, nearest
+from coupled.errors import InputError
 from coupled.resources import find, shipped_rigs
 from coupled.rig.rig import Rig, of_file
 from coupled.rig.rigfile import read_rig, rig_from_table
 from coupled.schema import loads_toml
 from coupled.surveying.draft import draft
-from coupled.surveying.survey import known_models, survey
+from coupled.surveying.survey import chosen_model, survey
 from coupled.surveying.whole import Survey, survey_models
 
 
@@ -48,8 +48,8 @@ def models(
 ) -> Survey:
     """Return where JSBSim's models trim or why not, how their controls move, and their rigs.
 
-    `names` are some of the models that are here; all without. `workers` are processes, 0 for one a
-    core. Raises InputError for a model that is not here.
+    `names` are some of the models that are here, or folders of others; all that are here without.
+    `workers` are processes, 0 for one a core. Raises InputError for a model that is not there.
 
     >>> import coupled
     >>> found = coupled.models(["T37"])
@@ -63,7 +63,7 @@ def models(
 def new_rig(model: str | PathLike[str], name: str = "") -> Rig:
     """Return a first rig for a JSBSim model: where it trims, found; its loader, guessed.
 
-    `model` is one that is here, or the folder of another (NAME/NAME.xml). `name` is the rig's, by
+    `model` is one that is here, or the folder of another, or its file. `name` is the rig's, by
     default the model's. The file that `save` writes marks each guess. Raises InputError for a
     model that is not here, does not trim, or has no control that a rig can move.
 
@@ -75,20 +75,13 @@ def new_rig(model: str | PathLike[str], name: str = "") -> Rig:
     True
     """
     word = fspath(model)
-    known, folder = known_models(), Path(word)
-    if word in known:
-        found = survey(word, known[word], speeds=True)
-    elif (folder / f"{folder.resolve().name}.xml").is_file():
-        folder = folder.resolve()
-        found = survey(folder.name, folder.parent, speeds=True)
-    else:
-        problem = f"is no JSBSim model and no folder of one (NAME/NAME.xml); {nearest(word, known)}"
-        raise InputError(word, "", problem)
+    chosen = chosen_model(word)
+    found = survey(chosen, speeds=True)
     if found.flight is None:
         raise InputError(word, "", f"does not trim wherever it was tried: {found.why}")
     if not found.controls:
         raise InputError(word, "", f"has no control that a rig could move: {found.lacking[0]}")
-    own = "" if word in known else str(folder.parent)
-    title = name or found.model
+    own = str(chosen.home) if chosen.own else ""
+    title = name or chosen.file or chosen.model
     text, file = draft(found, title, own), Path(f"{title}.toml")
     return of_file(rig_from_table(loads_toml(text, file), file), (file, text))

@@ -19,7 +19,7 @@ from coupled.cli.rigs import ControlOption
 from coupled.cli.tables.whole import print_whole
 from coupled.cli.terminal import check_json, give_json, out, say
 from coupled.display import System, in_system
-from coupled.errors import InputError, nearest, shown
+from coupled.errors import InputError, shown
 from coupled.record.channels import TIME, ControlName, control_named
 
 if TYPE_CHECKING:
@@ -28,10 +28,14 @@ if TYPE_CHECKING:
     from coupled.surveying.survey import Surveyed
 
 
-@app.command(epilog="[dim]Examples: coupled models · coupled models T37 DHC6 --json -[/]")
+@app.command(
+    epilog="[dim]Examples: coupled models · coupled models T37 DHC6 --json -"
+    " · coupled models ~/fgdata/Aircraft[/]"
+)
 def models(
     names: Annotated[
-        list[str] | None, typer.Argument(help="Models to look at. (default: all that are here)")
+        list[str] | None,
+        typer.Argument(help="Models, their files, or folders of models. (default: all known)"),
     ] = None,
     workers: Annotated[
         int,
@@ -45,7 +49,7 @@ def models(
     from coupled.surveying.survey import chosen_models
     from coupled.surveying.whole import survey_models
 
-    chosen_models(names or (), "coupled models")
+    chosen_models(names or ())
     check_json(json_file, [])
     with progress() as advance:
         found = survey_models(names or (), workers, advance)
@@ -81,7 +85,8 @@ def _print(rows: Sequence[Surveyed]) -> None:
 )
 def rig(
     model: Annotated[
-        str | None, typer.Argument(help="A JSBSim model that is here, or the folder of another.")
+        str | None,
+        typer.Argument(help="A JSBSim model that is here, or the folder or file of another."),
     ] = None,
     file: Annotated[
         Path | None, typer.Argument(help="The new rig file. (default: MODEL.toml)")
@@ -227,32 +232,18 @@ def _print_found(found: LogNumbers, control: ControlName, units: System) -> None
 def _for_model(model: str, file: Path | None) -> None:
     """Write a first rig for a JSBSim model: where it trims, found; its loader, guessed."""
     from coupled.surveying.draft import draft
-    from coupled.surveying.survey import survey
+    from coupled.surveying.survey import chosen_model, survey
 
-    name, home, own = _model(model)
-    path = file or Path(f"{name}.toml")
+    chosen = chosen_model(model)
+    path = file or Path(f"{chosen.file or chosen.model}.toml")
     check_new(path, ".toml")
     with progress() as advance:
-        advance(f"where {name} trims", 0, 1)
-        found = survey(name, home, speeds=True)
+        advance(f"where {chosen.label} trims", 0, 1)
+        found = survey(chosen, speeds=True)
     if found.flight is None:
         raise InputError(model, "", f"does not trim wherever it was tried: {found.why}")
     if not found.controls:
         raise InputError(model, "", f"has no control that a rig could move: {found.lacking[0]}")
-    folder = os.path.relpath(home, path.resolve().parent) if own else ""
+    folder = os.path.relpath(chosen.home, path.resolve().parent) if chosen.own else ""
     text = draft(found, path.stem, folder)
     write_new(path, text, ".toml", f"coupled new run --rig {path}, and coupled compare")
-
-
-def _model(word: str) -> tuple[str, Path, bool]:
-    """Return a model's name, the folder that its own lies in, and whether it is unknown."""
-    from coupled.surveying.survey import known_models
-
-    known = known_models()
-    if word in known:
-        return word, known[word], False
-    folder = Path(word)
-    if ("/" in word or folder.is_dir()) and (folder / f"{folder.resolve().name}.xml").is_file():
-        return folder.resolve().name, folder.resolve().parent, True
-    problem = f"is no JSBSim model and no folder of one (NAME/NAME.xml); {nearest(word, known)}"
-    raise InputError(word, "", problem)

@@ -101,7 +101,7 @@ def _differs(rig: Rig, other: Rig) -> str:
             if rig.flight is other.flight and not differs
             else (differs or ["another aircraft"])[0]
         )
-    for key in ("model", "steps_per_frame", *(a.part.name for a in ALTERATIONS)):
+    for key in ("model", "model_file", "steps_per_frame", *(a.part.name for a in ALTERATIONS)):
         if getattr(rig.flight, key) != getattr(other.flight, key):
             differs.append(f"flight.{key} = {getattr(other.flight, key)}")
     return differs[0] if differs else ""

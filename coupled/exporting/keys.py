@@ -74,7 +74,15 @@ EXPORTED: Mapping[type[Section], frozenset[str]] = {
     ),
     Flight: frozenset(
         (
-            *("model", "folder", "altitude", "calibrated_airspeed", "flight_path", "trim"),
+            *(
+                "model",
+                "folder",
+                "model_file",
+                "altitude",
+                "calibrated_airspeed",
+                "flight_path",
+                "trim",
+            ),
             *("properties", "direct_controls", "steps_per_frame", "elevator_effectiveness"),
             *("pitch_damping", "pitch_stiffness", "lift_slope", "cg_aft", "fuel"),
         )

@@ -68,7 +68,8 @@ def check_load(folder: Path, rig: Rig, file: object) -> None:
         return
     plain = {a.part.name: UNALTERED[a.part.name] for a in ALTERATIONS}
     plain |= {"cg_aft": 0.0, "fuel": 1.0}
-    exported = flight.model_copy(update={**plain, "folder": str(folder / "aircraft")})
+    own = {"folder": str(folder / "aircraft"), "model_file": ""}
+    exported = flight.model_copy(update={**plain, **own})
     frame_s, controls = 1.0 / rig.frame_rate, list(rig.controls)
     ours, alone = (
         make_aircraft(each, frame_s, controls, [aircraft_folder()], file)

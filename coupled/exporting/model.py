@@ -63,7 +63,7 @@ def model_files(flight: Flight | None, systems: Sequence[str], file: object) -> 
     home = _home(flight, file)
     parts = [a.part for a in ALTERATIONS if a.factor(flight) != 1.0]
     try:
-        with loadable(home, name, parts) as made:
+        with loadable(home / flight.main_file, parts) as made:
             main = read_bytes(made / name / f"{name}.xml")
     except NothingToScaleError as error:
         problem = f"{name} has no {error.scaled.quantity} that could be scaled; leave it at 1"

@@ -155,9 +155,12 @@ class JSBSimAirframe:
         for folder in reversed(models):
             known |= models_in(folder)
         if self._flight.folder:
-            known[name] = self._own_folder(name)
+            known[name] = self._own_folder()
         if name not in known:
             raise self.fault("model", f"there is no JSBSim model {name!r}; {nearest(name, known)}")
+        main = known[name] / self._flight.main_file
+        if not main.is_file():
+            raise self.fault("model_file", f"there is no {self._flight.main_file} of JSBSim")
         fdm = jsbsim.FGFDMExec(jsbsim.get_default_root_dir())
         frame_s /= self._flight.steps_per_frame
         fdm.set_dt(frame_s)  # before loading, for the model's rate limits
@@ -165,7 +168,7 @@ class JSBSimAirframe:
         scaled = [part for wrapper in wrappers for part in wrapper.scaled]
         ballast = any(wrapper.ballast for wrapper in wrappers)
         try:
-            with loadable(known[name], name, scaled, ballast) as folder:
+            with loadable(main, scaled, ballast) as folder:
                 fdm.set_aircraft_path(str(folder))
                 loaded = fdm.load_model(name)
         except NothingToScaleError as error:
@@ -195,15 +198,15 @@ class JSBSimAirframe:
         self._catalog = catalogue(fdm.query_property_catalog(""))
         return fdm
 
-    def _own_folder(self, name: str) -> Path:
+    def _own_folder(self) -> Path:
         """Return the folder of the rig's own model."""
         folder = Path(self._flight.folder)
         try:
-            there = (folder / name / f"{name}.xml").is_file()
+            there = (folder / self._flight.main_file).is_file()
         except (OSError, ValueError):  # a name that no folder can have
             there = False
         if not there:
-            raise self.fault("model_folder", f"holds no {name}/{name}.xml")
+            raise self.fault("model_folder", f"holds no {self._flight.main_file}")
         return folder
 
     def _set(self, name: str, value: float) -> None:

@@ -101,21 +101,24 @@ def catalogue(text: str) -> Mapping[str, str]:
 
 
 @contextmanager
-def loadable(
-    models: Path, name: str, scaled: Sequence[Scaled], ballast: bool = False
-) -> Iterator[Path]:
+def loadable(main: Path, scaled: Sequence[Scaled], ballast: bool = False) -> Iterator[Path]:
     """Yield the folder of models from which to load a model, with parts of it scalable.
 
-    With `ballast` it has one more point mass, of zero weight. Raises NothingToScaleError,
-    UnreadableModelError for a file that is not XML, or OSError if a temporary folder cannot be
-    written.
+    `main` is the model's main file. JSBSim gives the folder of a model and its file one name, so
+    a file of another name gets that of the folder. With `ballast` the model has one more point
+    mass, of zero weight. Raises NothingToScaleError, UnreadableModelError for a file that is not
+    XML, or OSError if a temporary folder cannot be written.
     """
-    if not scaled and not ballast:
-        yield models
+    folder = main.parent
+    name = folder.name
+    if not scaled and not ballast and main.stem == name:
+        yield folder.parent
         return
-    folder = models / name
-    state = (folder / f"{name}.xml").stat()
-    text = _scalable(folder, tuple(scaled), ballast, state.st_mtime_ns, state.st_size)
+    if scaled or ballast:
+        state = main.stat()
+        text = _scalable(main, tuple(scaled), ballast, state.st_mtime_ns, state.st_size)
+    else:
+        text = read_bytes(main, MOST_TEXT_bytes)
     clear_temporary()
     temporary = temporary_folder()
     try:
@@ -143,10 +146,11 @@ def _stand_in(place: Path, entry: Path) -> None:
 
 @lru_cache(maxsize=16)
 def _scalable(
-    folder: Path, scaled: tuple[Scaled, ...], ballast: bool, changed_ns: int, size: int
+    main: Path, scaled: tuple[Scaled, ...], ballast: bool, changed_ns: int, size: int
 ) -> bytes:
     """Return a model's text with parts of it scalable; `changed_ns` and `size` key the cache."""
-    root = _read(folder / f"{folder.name}.xml")
+    folder = main.parent
+    root = _read(main)
     for one in scaled:
         aerodynamics = _section(root, folder, "aerodynamics")
         if aerodynamics is None:

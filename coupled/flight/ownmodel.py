@@ -27,7 +27,7 @@ REFUSED = 3  # exit code of a process that reports the fault itself
 LONGEST_s = 60.0  # a packaged model takes less than 2 s on a slow machine
 # Keys of a flight section that change the loaded files or their content.
 _LOADED = (
-    *("model", "folder", "steps_per_frame", "trim", "mass", "elevator_effectiveness"),
+    *("model", "folder", "model_file", "steps_per_frame", "trim", "mass", "elevator_effectiveness"),
     *("pitch_damping", "pitch_stiffness", "lift_slope", "cg_aft", "fuel"),
 )
 _MOST_FILES = 10_000

@@ -265,6 +265,10 @@ class Flight(Section):
         str, text_like(r"[^\x00-\x1f\x7f/\\]{1,120}", "should be the name of a JSBSim model")
     ]
     folder: str = named("model_folder", "")
+    model_file: Annotated[
+        str,
+        text_like(r"[^\x00-\x1f\x7f/\\]{0,120}", "should be a file of the model's folder"),
+    ] = ""
     altitude: float = quantity("m")
     calibrated_airspeed: float = quantity("m_per_s", gt=0)
     flight_path: float = quantity("rad", 0.0, ge=-0.6, le=0.6)
@@ -283,3 +287,9 @@ class Flight(Section):
     gust_rms: float = quantity("m_per_s", 0.0, ge=0, le=30)
     gust_length: float = quantity("m", 150.0, gt=0)
     properties: dict[str, float] = {}
+
+    @property
+    def main_file(self) -> str:
+        """The model's main file, relative to the folder of all models."""
+        file = self.model_file.removesuffix(".xml") or self.model
+        return f"{self.model}/{file}.xml"

@@ -246,7 +246,7 @@ def test_what_a_killed_load_left_is_removed_by_the_next(tmp_path: Path) -> None:
         assert list(tmp_path.iterdir()) == [ours]
         ours.rmdir()
         part = ALTERATIONS[0].part
-        with loadable(packaged_models()["T37"], "T37", [part]) as folder:
+        with loadable(packaged_models()["T37"] / "T37" / "T37.xml", [part]) as folder:
             assert folder.parent == tmp_path
         assert list(tmp_path.iterdir()) == []
 
