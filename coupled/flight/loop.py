@@ -32,6 +32,7 @@ from coupled.flight.manoeuvre import Manoeuvre
 from coupled.flight.pilot import Action
 from coupled.flight.pilot.base import Look, Start
 from coupled.flight.served import Served
+from coupled.flight.trimmable import with_speeds
 from coupled.record.channels import (
     PRESSURE,
     SURFACES,
@@ -203,11 +204,13 @@ def make_airframe(manoeuvre: Manoeuvre, air_m_per_s: Sequence[float] | None = No
             ),
             gusts=Gusts(rig.flight, frame_s, manoeuvre.seed, air_m_per_s),
         )
-    except InputError as error:
-        if source is None or error.key not in source.changes:
-            raise
-        place = f"case {manoeuvre.label!r}: rig.{error.key}"
-        raise InputError(source.run_file, place, error.problem) from None
+    except InputError as fault:
+        make = partial(make_aircraft, frame_s=frame_s, models=models, file=rig_file)
+        error = with_speeds(fault, rig.flight, make)
+        if source is not None and error.key in source.changes:
+            place = f"case {manoeuvre.label!r}: rig.{error.key}"
+            error = InputError(source.run_file, place, error.problem)
+        raise error from None
 
 
 def _actions(manoeuvre: Manoeuvre, pressure_Pa: float) -> dict[ControlName, Action]:

@@ -16,6 +16,7 @@ the model's other files. The model's own folder is never written to.
 from __future__ import annotations
 
 import copy
+import re
 import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -24,6 +25,7 @@ from functools import lru_cache
 from pathlib import Path
 from xml.etree import ElementTree
 
+from coupled.errors import InputError
 from coupled.files import MOST_TEXT_bytes, clear_temporary, read_bytes, temporary_folder
 
 Element = ElementTree.Element
@@ -92,6 +94,38 @@ def models_in(folder: Path) -> dict[str, Path]:
 
 def _is_model(folder: Path) -> bool:
     return (folder / f"{folder.name}.xml").is_file()
+
+
+_PART = r"[A-Za-z_][\w.\-]*(?:\[\d+\])?"
+_PATH = re.compile(rf"-?(/?{_PART}(?:/{_PART})+)").fullmatch
+_READING = frozenset(
+    ("property", "p", "input", "test", "condition", "independentVar", "min", "max", "setpoint")
+)
+
+
+def properties_read(main: Path) -> set[str]:
+    """Return the names of the properties that a model's files read or declare.
+
+    `main` is its main file. Files that are not XML are left out.
+    """
+    found, waiting, known = set[str](), [main], set[Path]()
+    while waiting:
+        file = waiting.pop()
+        if file in known or not file.is_file():
+            continue
+        known.add(file)
+        try:
+            elements = list(_read(file).iter())
+        except (UnreadableModelError, InputError):
+            continue
+        for element in elements:
+            words = (element.text or "").split() if element.tag in _READING else []
+            words.append(element.get("value", ""))
+            found |= {match[1].replace("[0]", "") for word in words if (match := _PATH(word))}
+            if own := element.get("file", "").removesuffix(".xml"):
+                folders = ("", "Engines", "Systems")
+                waiting += [main.parent / folder / f"{own}.xml" for folder in folders]
+    return found
 
 
 @lru_cache(maxsize=8)

@@ -48,7 +48,7 @@ class Surveyed:
     """What was found of a model; SI.
 
     `flight` is a state in which it trims and `holds` whether it keeps it hands off; without one,
-    `why` has JSBSim's own reason. `controls` are those that a rig can lead, `direct` whether they
+    `why` has the reason. `controls` are those that a rig can lead, `direct` whether they
     all move their surface at once; `lacking` says what keeps the others out.
     """
 
@@ -205,7 +205,8 @@ def survey(model: ModelFile, *, speeds: bool = False) -> Surveyed:
             if holds:
                 break
         else:  # the first try is the likeliest, and its reason the one that counts
-            why = why or problem.partition("JSBSim: ")[2].partition("; choose")[0] or problem
+            found_out = problem.partition("calibrated_airspeed_m_per_s = ")[2].partition(": ")[2]
+            why = why or found_out.partition("; choose")[0] or problem
         if time.monotonic() > ended_s:
             break
     if found is None:
@@ -267,7 +268,7 @@ def _quantity(file: Path, tag: str, units: dict[str, float]) -> float:
 
 
 def _trims(flight: Flight, home: Path) -> str:
-    """Return why a model does not trim, in JSBSim's words, or an empty string."""
+    """Return why a model does not trim, or an empty string."""
     try:
         make_aircraft(flight, FRAME_s, ("column",), [home], "model")
     except InputError as error:
