@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -20,6 +19,7 @@ from coupled.cli.tables.whole import print_whole
 from coupled.cli.terminal import check_json, give_json, out, say
 from coupled.display import System, in_system
 from coupled.errors import InputError, shown
+from coupled.files import path_from
 from coupled.record.channels import TIME, ControlName, control_named
 
 if TYPE_CHECKING:
@@ -244,6 +244,6 @@ def _for_model(model: str, file: Path | None) -> None:
         raise InputError(model, "", f"does not trim wherever it was tried: {found.why}")
     if not found.controls:
         raise InputError(model, "", f"has no control that a rig could move: {found.lacking[0]}")
-    folder = os.path.relpath(chosen.home, path.resolve().parent) if chosen.own else ""
+    folder = path_from(path.parent, chosen.home) if chosen.own else ""
     text = draft(found, path.stem, folder)
     write_new(path, text, ".toml", f"coupled new run --rig {path}, and coupled compare")
