@@ -7,8 +7,8 @@ the set A with its i-th column from B. For a figure f with variance V over them,
     total_i = ⟨(f_A − f_ABi)²⟩/(2·V)       with all interactions of i (Jansen 1999)
 
 `scipy.stats.sobol_indices` gives the same numbers, but refuses any number of points that is no
-power of two. The intervals are those of 95 % over resampled points. A point is left out if one of its flights
-could not be flown, or ended before the figure was available.
+power of two. The intervals are those of 95 % over resampled points. A point is left out if one of
+its flights could not be flown, or ended before the figure was available.
 """
 
 from __future__ import annotations
