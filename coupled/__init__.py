@@ -12,6 +12,7 @@ Load
     load_rig        a rig file, or a shipped rig by name: `Rig`
     new_rig         a first rig for a JSBSim aircraft; `rig.save` writes it
     models          JSBSim's aircraft: where each trims, how its controls move
+    terms           the named functions of an aircraft's aerodynamics, with their shares
     load_run        a run file, or a shipped run by name: a `Manoeuvre` each case
     read_record     a record of CSV or Parquet: `Record`
     write_record    the reverse, with a manifest
@@ -22,11 +23,13 @@ Fly
     compare         rigid, uncompensated, each correction, both: `.loss(…)`, `.to_polars()`
     check           runs held against what they expect
     sweep           a run over values of its parameters, to one table
+    Session         a flight stepped from outside: one frame, one `State`, for each `step`
 
 Pilots, on `column`, `wheel` or `pedals`
     Step Ramp Doublet ThreeTwoOneOne FrequencySweep ForceTable     a force over time
     Clamp                                                          a held deflection
     Attitude Track                                                 a closed loop
+    a function of the `State` that returns a force in N            your own
 
 Calibrate and diagnose
     plan            the readings to take; `bench` takes them at a simulated rig
@@ -39,6 +42,7 @@ Analyse and hand on
     stability       where a rig is stable, over K·G_T
     document        forces and control checks of 14 CFR Part 60
     export          a rig's loader as JSBSim systems
+    export_fmu      a control's loader as an FMU
 
 Results display themselves in a notebook. Each has `.report(file)`, most have `.plot()`,
 `.to_polars()` and `.to_pandas()`.
@@ -66,11 +70,12 @@ if TYPE_CHECKING:
     from coupled.api.analyses import map_authority, stability
     from coupled.api.benches import bench, plan
     from coupled.api.documents import document
-    from coupled.api.exports import export
+    from coupled.api.exports import export, export_fmu
     from coupled.api.flights import compare, fly, load_run
     from coupled.api.gaps import diagnose, fit
     from coupled.api.records import import_log, read_record, write_record
-    from coupled.api.rigs import load_rig, models, new_rig
+    from coupled.api.rigs import load_rig, models, new_rig, terms
+    from coupled.api.sessions import Session
     from coupled.calibration.calibrate import calibrate
     from coupled.calibration.calibrated import with_calibration
     from coupled.campaign.check import check
@@ -88,6 +93,7 @@ if TYPE_CHECKING:
         ThreeTwoOneOne,
         Track,
     )
+    from coupled.flight.state import State
     from coupled.record.record import Record
     from coupled.rig.rig import Rig
 
@@ -103,6 +109,8 @@ __all__ = [
     "Ramp",
     "Record",
     "Rig",
+    "Session",
+    "State",
     "Step",
     "ThreeTwoOneOne",
     "Track",
@@ -113,6 +121,7 @@ __all__ = [
     "diagnose",
     "document",
     "export",
+    "export_fmu",
     "fit",
     "fly",
     "import_log",
@@ -125,6 +134,7 @@ __all__ = [
     "read_record",
     "stability",
     "sweep",
+    "terms",
     "with_calibration",
     "write_record",
 ]
@@ -133,11 +143,12 @@ _HOMES = {
     "coupled.api.analyses": ("map_authority", "stability"),
     "coupled.api.benches": ("bench", "plan"),
     "coupled.api.documents": ("document",),
-    "coupled.api.exports": ("export",),
+    "coupled.api.exports": ("export", "export_fmu"),
     "coupled.api.flights": ("compare", "fly", "load_run"),
     "coupled.api.gaps": ("diagnose", "fit"),
     "coupled.api.records": ("import_log", "read_record", "write_record"),
-    "coupled.api.rigs": ("load_rig", "models", "new_rig"),
+    "coupled.api.rigs": ("load_rig", "models", "new_rig", "terms"),
+    "coupled.api.sessions": ("Session",),
     "coupled.calibration.calibrate": ("calibrate",),
     "coupled.calibration.calibrated": ("with_calibration",),
     "coupled.campaign.check": ("check",),
@@ -148,6 +159,7 @@ _HOMES = {
         *("Attitude", "Clamp", "Doublet", "ForceTable", "FrequencySweep"),
         *("Ramp", "Step", "ThreeTwoOneOne", "Track"),
     ),
+    "coupled.flight.state": ("State",),
     "coupled.record.record": ("Record",),
     "coupled.rig.rig": ("Rig",),
 }

@@ -59,12 +59,20 @@ def public(thing: T) -> T:
     return cast(T, _checked(function, f"coupled.{function.__qualname__}"))
 
 
+def checks_itself(function: T) -> T:
+    """Mark a function that checks its arguments itself, since it is called in every frame."""
+    setattr(function, MARK, True)
+    return function
+
+
 def _check_member(owner: type, name: str, member: Any) -> None:
     """Let a function of a class check its arguments; leave what is none."""
     kind = type(member) if isinstance(member, (classmethod, staticmethod)) else None
     function = member.__func__ if kind else member
     # What a library puts into a class, as pydantic does, checks its arguments itself.
     if not isinstance(function, types.FunctionType) or function.__module__ != owner.__module__:
+        return
+    if getattr(function, MARK, False):
         return
     own = "" if name == "__init__" else f".{name}"
     checked = _checked(function, f"coupled.{owner.__name__}{own}")

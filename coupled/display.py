@@ -29,10 +29,23 @@ SHARES: Final = ("loss", "loss_closed_form", "felt_ratio", "felt_ratio_closed_fo
 
 @dataclass(frozen=True)
 class Shown:
-    """What a quantity is written in: the unit's word, and by what its SI number is multiplied."""
+    """What a quantity is written in: the unit's word, and by what its SI number is multiplied.
+
+    `words` name the quantity, where they are known.
+    """
 
     unit: str
     factor: float = 1.0
+    words: str = ""
+
+    @property
+    def label(self) -> str:
+        """The quantity's words with the unit, for an axis or a head."""
+        return self.labelled(self.words)
+
+    def labelled(self, words: str) -> str:
+        """Return other words with the unit; the words alone for a number without a unit."""
+        return f"{words}, {self.unit}" if self.unit else words
 
     def written(self, value: float, digits: int = 4) -> str:
         """Return a number of so many figures, without its unit."""
@@ -110,7 +123,7 @@ def in_system(unit: str, system: System = "si") -> Shown:
 
 def pressure_shown(system: System = "si") -> Shown:
     """Return what a dynamic pressure in Pa is written in: kPa, or lb/ft²."""
-    return Shown("kPa", 1e-3) if system == "si" else in_system("Pa", system)
+    return drawn("Pa", system)
 
 
 def pressure_in(pressure_Pa: float, system: System = "si", digits: int = 2) -> str:
@@ -164,3 +177,18 @@ def shown(name: str, system: System = "si") -> Shown:
     if system == "us" and unit == "m" and name.startswith("altitude"):
         return _ALTITUDE
     return (_US if system == "us" else _SI).get(unit, Shown(""))
+
+
+def drawn(name: str, system: System = "si", fine: bool = False) -> Shown:
+    """Return what a quantity of this name is drawn in: as `shown`, but cm, kPa and g in SI.
+
+    `fine` is for residuals and travels: mm in place of cm.
+    """
+    unit = unit_in(name)
+    if name == "load_factor":
+        return Shown("g")
+    if system == "si" and unit == "m" and not name.startswith("altitude"):
+        return Shown("mm", 1000.0) if fine else Shown("cm", 100.0)
+    if system == "si" and unit == "Pa":
+        return Shown("kPa", 1e-3)
+    return shown(name, system)

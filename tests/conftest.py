@@ -1,4 +1,4 @@
-"""Settings of all tests: how many run at once, and where their compiled physics is kept."""
+"""Settings of all tests: the number of workers, and the folder of the compiled physics."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ MOST_WORKERS = 4
 
 
 def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
-    """Return how many workers share the whole suite, one a core; a chosen part of it needs none.
+    """Return the number of workers: one per core for the whole suite, none for a part of it.
 
     Nor do benchmarks: what runs beside a measurement is measured, too.
     """

@@ -68,7 +68,7 @@ COMPARISONS: dict[type[ast.cmpop], type[ast.cmpop]] = {
 
 @dataclass(frozen=True)
 class Mutant:
-    """One change: bytes from `start` to `end` of the source give way to `new`."""
+    """One change: bytes from `start` to `end` of the source are replaced by `new`."""
 
     line: int
     start: int
@@ -100,7 +100,7 @@ def mutants(source: bytes) -> list[Mutant]:
 
 
 def by_hand(source: bytes, old: str, new: str) -> Mutant:
-    """Return the change of a text that stands once in the source; ValueError where it does not."""
+    """Return the change of a text that occurs once in the source; raises ValueError otherwise."""
     if source.count(old.encode()) != 1:
         message = f"{old!r} is to stand in the module once"
         raise ValueError(message)
@@ -124,7 +124,7 @@ def _physics(node: ast.AST) -> Iterator[ast.expr | ast.AugAssign]:
 
 
 def _broken(node: ast.expr | ast.AugAssign) -> Iterator[ast.expr | ast.AugAssign]:
-    """Yield what a node is changed to."""
+    """Yield the replacements of a node."""
     other = copy.deepcopy(node)
     match other:
         case ast.BinOp() | ast.AugAssign() if type(other.op) in OPERATORS:
@@ -168,7 +168,7 @@ class _Changed(importlib.machinery.SourceFileLoader):
 
 @dataclass(frozen=True)
 class _Finder(importlib.abc.MetaPathFinder):
-    """Finds the changed module before its file is looked at."""
+    """Finds the changed module before Python finds its file."""
 
     loader: _Changed
 
@@ -181,7 +181,7 @@ class _Finder(importlib.abc.MetaPathFinder):
 
 
 class _Watch:
-    """A plug-in that remembers the first test that failed; examples are the same each time."""
+    """A pytest plugin that keeps the first failed test; examples are the same each time."""
 
     name = ""
 
@@ -228,7 +228,7 @@ def dependants(name: str) -> set[str]:
 
 
 def forget(names: set[str]) -> None:
-    """Let modules be imported anew."""
+    """Remove modules, so that they are imported again."""
     for name in names & set(sys.modules):
         del sys.modules[name]
         package, _, inner = name.rpartition(".")
@@ -236,7 +236,7 @@ def forget(names: set[str]) -> None:
 
 
 def uncached() -> None:
-    """Let no kernel come from disk, where it was compiled from the file as it is."""
+    """Disable the kernels' disk cache, which was compiled from the unchanged file."""
 
     def entry(function: Any, **_: bool) -> Any:
         return numba.njit(function)
@@ -245,7 +245,7 @@ def uncached() -> None:
 
 
 def compile_stages() -> None:
-    """Compile the stages of the rig, so that a fork has to compile only what is changed."""
+    """Compile the stages of the rig, so that a fork compiles only changed ones."""
     rigs: Any = importlib.import_module("tests.support.rigs")
     standalone: Any = importlib.import_module("coupled.rig.standalone")
     rig = rigs.bench()
@@ -256,7 +256,7 @@ def compile_stages() -> None:
 def _tried(
     name: str, source: bytes, stale: set[str], tests: list[str], limit_s: float, answer: int
 ) -> NoReturn:
-    """Run the tests with the module changed, in a process of its own; answer the first failure."""
+    """Run the tests with the changed module in a separate process; send the first failure."""
     os.setsid()
     signal.alarm(math.ceil(limit_s) + 1)  # should this process be ended before it
     nowhere = os.open(os.devnull, os.O_RDWR)
@@ -277,7 +277,7 @@ def _tried(
 
 
 def killer(name: str, source: bytes, stale: set[str], tests: list[str], limit_s: float) -> str:
-    """Return the first test that fails with the module changed; empty where none does."""
+    """Return the first test that fails with the changed module; empty if none fails."""
     reading, writing = os.pipe()
     child = os.fork()
     if child == 0:

@@ -18,7 +18,7 @@ from typing import Any
 
 import pytest
 
-from coupled.cli.process import Stop, asked_to_stop
+from coupled.cli.process import Stop, was_interrupted
 from coupled.cli.progress import MARK, progress
 from coupled.parallel import Here, as_done, executor
 from tests.support.commands import coupled
@@ -233,13 +233,13 @@ def test_each_job_is_done_once_and_few_wait() -> None:
 def test_an_interruption_that_a_library_swallowed_ends_the_work_at_its_next_step() -> None:
     with Stop(), progress("work") as advance:
         advance("one", 1, 3)
-        assert not asked_to_stop()
+        assert not was_interrupted()
         with contextlib.suppress(KeyboardInterrupt):  # as a library does
             signal.raise_signal(signal.SIGINT)
-        assert asked_to_stop()
+        assert was_interrupted()
         with pytest.raises(KeyboardInterrupt):
             advance("two", 2, 3)
-    assert not asked_to_stop()
+    assert not was_interrupted()
 
 
 def test_a_pipe_gets_a_line_every_so_often(

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from coupled import load_rig, new_rig
 from coupled.calibration.form import starting_form
 from coupled.calibration.readingsfile import read_readings
 from coupled.campaign.plan import read_plan
@@ -62,6 +63,51 @@ def test_a_rig_that_no_run_suits_is_refused_and_nothing_written(tmp_path: Path) 
     assert done.returncode == 2
     assert "controls.column.drive: a setpoint has no loader that a force moves" in done.stderr
     assert files(tmp_path) == {"mine.toml"}
+
+
+def test_a_rig_may_be_an_aircraft_alone(tmp_path: Path) -> None:
+    made = coupled(tmp_path, "new", "rig", "T37", "air.toml", "--airframe-only")
+    assert made.stdout.splitlines() == ["written: air.toml", "next: coupled terms T37"]
+    rig = load_rig(tmp_path / "air.toml")
+    assert (rig.controls, rig.flight and rig.flight.model) == ({}, "T37")
+    assert new_rig("T37", "air", airframe_only=True).to_toml() == rig.to_toml()
+    turned = rig.changed({"flight.roll_damping": 0.7, "flight.terms": {"aero/coefficient/Clr": 2}})
+    turned.save(tmp_path / "turned.toml")
+    assert load_rig(tmp_path / "turned.toml") == turned
+    (tmp_path / "run.toml").write_text(
+        'name = "x"\ncard = "x"\nrig = "air.toml"\nduration_s = 2\n'
+        '[pilot.column]\nkind = "step"\nforce_N = 20\n'
+    )
+    (tmp_path / "sweep.toml").write_text(
+        'name = "x"\nrun = "run.toml"\n[[vary]]\nkey = "rig.flight.mass"\nvalues = [1.0, 1.1]\n'
+    )
+    known = files(tmp_path)
+    for words in (
+        *(("map", "air.toml"), ("stability", "air.toml"), ("document", "air.toml")),
+        *(("bench", "--rig", "air.toml"), ("calibrate", "--plan", "--rig", "air.toml")),
+        *(("new", "run", "n.toml", "--rig", "air.toml"), ("export", "air.toml", "--jsbsim", "o")),
+        *(("compare", "./run.toml"), ("fly", "./run.toml"), ("check", "./run.toml")),
+        *(("sweep", "sweep.toml"), ("live", "./run.toml")),
+    ):
+        done = coupled(tmp_path, *words)
+        assert done.returncode == 2, words
+        assert done.stderr.endswith(
+            "air.toml: controls: the rig has an aircraft only;"
+            " give a rig with a control ([controls.column])\n"
+        ), (words, done.stderr)
+        assert done.stderr.count("\n") == 1, done.stderr
+    assert files(tmp_path) == known
+
+
+def test_a_rig_with_neither_control_nor_aircraft_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "none.toml").write_text('name = "none"\nframe_rate_Hz = 120.0\n')
+    with pytest.raises(InputError, match=r"controls: needs at least one of column, .*\[flight\]"):
+        load_rig(tmp_path / "none.toml")
+    with pytest.raises(InputError, match=r"controls: a rig needs a control or an aircraft"):
+        new_rig("T37", airframe_only=True).changed({"flight": None})
+    done = coupled(tmp_path, "new", "rig", "--bench", "b.toml", "--airframe-only")
+    assert done.returncode == 2
+    assert "--airframe-only: a bench has no aircraft" in done.stderr
 
 
 def test_a_new_sweep_is_planned_as_its_comments_say(tmp_path: Path) -> None:

@@ -91,10 +91,22 @@ def test_what_a_new_user_does_takes_six_commands_at_most() -> None:
             assert len(re.findall(r"^\$ ", block, re.M)) <= 6, page
 
 
-@pytest.mark.slow
-def test_the_python_example_prints_what_it_says(folders: dict[Path, Path]) -> None:
-    [(code, output)] = PYTHON.findall(README.read_text(encoding="utf-8"))
-    assert run_python(code, folders[README]) == trimmed(output)
+EXAMPLES = [
+    pytest.param(page, code, output, marks=[pytest.mark.slow] if page == README else [])
+    for page in PAGES
+    for code, output in PYTHON.findall(page.read_text(encoding="utf-8"))
+]
+
+
+@pytest.mark.parametrize(("page", "code", "output"), EXAMPLES)
+def test_a_python_example_prints_what_it_says(
+    folders: dict[Path, Path], page: Path, code: str, output: str
+) -> None:
+    assert run_python(code, folders[page]) == trimmed(output)
+
+
+def test_readme_and_a_guide_have_python_examples() -> None:
+    assert len(EXAMPLES) >= 2
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)

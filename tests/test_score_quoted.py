@@ -30,9 +30,10 @@ from coupled.blind.trials.result import (
     Score,
     Share,
 )
-from coupled.cli.tables.trials import print_score
+from coupled.cli.tables import print_table
 from coupled.plots.saving import save
 from coupled.plots.trials import draw_score
+from coupled.tables.trials import score_table
 from tests.support.commands import ROOT
 
 SCORED = "the version of 25 November 2026"  # whose diagnoses the file scores
@@ -111,8 +112,8 @@ def table(score: Score) -> str:
     """Return the shares as the command prints them on a terminal of 80 columns."""
     console = Console(width=80, no_color=True, color_system=None)
     with console.capture() as caught:
-        print_score(console, score)
-    shares = caught.get().partition("\n\n")[0]
+        print_table(console, score_table(score))
+    shares = caught.get()
     return "\n".join(line.rstrip() for line in shares.splitlines())
 
 

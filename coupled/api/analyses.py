@@ -8,7 +8,7 @@ from os import PathLike
 from coupled.api.records import Given, named_records
 from coupled.api.rigs import rig_given
 from coupled.arguments import public
-from coupled.authority.stability.whole import Stability, bending, map_stability
+from coupled.authority.stability.whole import Stability, compliant_controls, map_stability
 from coupled.authority.whole import AuthorityMap, map_rig
 from coupled.errors import InputError
 from coupled.record.channels import ControlName
@@ -58,4 +58,4 @@ def stability(
     ('column', ['control', 'quantity'])
     """
     data = rig_given(rig)
-    return map_stability(data, bending(data, control), progress)
+    return map_stability(data, compliant_controls(data, control), progress)

@@ -116,6 +116,7 @@ def _asked(
 ) -> tuple[Rig, Instruments]:
     """Return the rig, which has the control, and the instruments."""
     data = rig_given(rig)
+    data.check_controlled(data.file)
     if control not in data.controls:
         problem = f"the rig has no {control}; {nearest(control, data.controls)}"
         raise InputError(data.name, "controls", problem)

@@ -55,10 +55,11 @@ from coupled.reports.forces import force_report, force_summary
 from coupled.reports.made import made_by
 from coupled.reports.page import InputFile, Made, Report, render, render_part
 from coupled.reports.records import draw_flight, fit_report, flight_report, record_report
-from coupled.reports.rigs import export_report, rig_report, survey_report
+from coupled.reports.rigs import export_report, rig_report, survey_report, terms_report
 from coupled.reports.sweep import sweep_report
 from coupled.rig.guesses import guess_note
 from coupled.rig.rig import Rig
+from coupled.surveying.terms import ModelTerms
 from coupled.surveying.whole import Survey
 
 _ALL = 100  # sections
@@ -111,6 +112,7 @@ DISPLAYS: dict[type, _Way] = {
     ReadingsPlan: _Way(plan_report, rig=lambda found: found.rig),
     Readings: _Way(readings_report, draw_taken),
     Survey: _Way(survey_report),
+    ModelTerms: _Way(terms_report),
     Export: _Way(export_report, rig=lambda found: found.rig),
 }
 

@@ -1,14 +1,16 @@
-"""A rig's loader taken to JSBSim."""
+"""A rig's loader taken to JSBSim, or to any simulator that imports an FMU."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from os import PathLike, fspath
 from pathlib import Path
+from typing import Literal
 
 from coupled.api.rigs import rig_given
 from coupled.arguments import public
 from coupled.errors import InputError, nearest
+from coupled.exporting.fmu.write import Fmu, check_file, make_fmu, write_fmu
 from coupled.exporting.folder import check_folder, exportable, runs_of, write_export
 from coupled.exporting.write import Export, RATE_Hz
 from coupled.exporting.write import export as make
@@ -53,4 +55,29 @@ def export(
     flown, _ = exportable(data, cases)
     made = make(data, flown, data.file or data.name, loader_rate_Hz, check, progress)
     write_export(made, place)
+    return made
+
+
+@public
+def export_fmu(
+    rig: Rig | str | PathLike[str],
+    file: str | PathLike[str],
+    control: str = "",
+    fmi: Literal[2, 3] = 3,
+) -> Fmu:
+    """Write the loader, linkage, sensing and compensation of a control as an FMU.
+
+    `file` ends in .fmu; it is for co-simulation on this platform, by FMI 3.0 or 2.0. A rig of
+    several controls needs one named. Needs a C compiler. Raises InputError without one, for a file
+    that cannot be written, and for a control that the rig does not have.
+
+    >>> import coupled
+    >>> coupled.export_fmu("t37", "t37.fmu")
+    Traceback (most recent call last):
+    coupled.errors.InputError: …t37.toml: control: an FMU has one control; choose of column, wheel…
+    """
+    place = Path(file)
+    check_file(place)
+    made = make_fmu(rig_given(rig), control, fmi)
+    write_fmu(made, place)
     return made

@@ -15,12 +15,14 @@ from coupled.errors import InputError
 from coupled.flight.conditions import Conditions, build_conditions
 from coupled.flight.manoeuvre import Configuration, Manoeuvre, PressureProfile
 from coupled.flight.pilot import Pilot
+from coupled.flight.pilot.own import Law, as_pilot
 from coupled.flight.runfile import read_run
 from coupled.record.channels import CONTROL_NAMES, ControlName
 from coupled.rig.rig import Rig
 from coupled.schema import known_keys
 
 Path = str | PathLike[str]
+Gradients = Law | Mapping[ControlName, Law]
 
 
 class Terms(TypedDict, total=False):
@@ -56,9 +58,10 @@ def load_run(run: Path) -> list[Manoeuvre]:
 def fly(
     what: Manoeuvre | Rig | Path,
     *,
-    column: Pilot | None = None,
-    wheel: Pilot | None = None,
-    pedals: Pilot | None = None,
+    column: Pilot | Law | None = None,
+    wheel: Pilot | Law | None = None,
+    pedals: Pilot | Law | None = None,
+    gradient: Gradients | None = None,
     duration_s: float | None = None,
     configuration: Configuration | None = None,
     progress: Callable[[int, int], None] | None = None,
@@ -73,6 +76,11 @@ def fly(
     `compensated` or `calibrated low`; without it the rig flies as it is. `progress` is called
     with frames done and frames in all.
 
+    A pilot may also be a function of the `State` at t_k, called once a frame; it returns the force
+    over the frame, N. `gradient` is a function of the state that returns G_T, N per m (rad on a
+    wheel), in place of the rig's schedule; of several controls, a table by control. If a function
+    has a function `reset`, it is called at the start of each flight.
+
     Further keywords: `seed` (0); `dynamic_pressure_Pa`, a number or a `PressureProfile`, for a
     rig without aircraft; `wind`, `gust`, `turbulence` and `event`, tables as in a run file;
     `record_properties`, of JSBSim; `name`.
@@ -86,9 +94,13 @@ def fly(
     np.float64(50.0)
     >>> len(flight.record), flight.ended_early
     (360, '')
+    >>> def hold_level(state):
+    ...     return -400.0 * state.pitch_rate_rad_per_s
+    >>> coupled.fly("t37", column=hold_level, duration_s=1).record["column_force_N"].size
+    120
     """
-    pilots = _pilots(column, wheel, pedals)
-    manoeuvre = _manoeuvre(what, pilots, duration_s, terms)
+    pilots = pilots_of(column, wheel, pedals)
+    manoeuvre = manoeuvre_of(what, pilots, duration_s, gradient, terms)
     if configuration is None:
         return fly_and_judge(manoeuvre, AS_THE_RIG, progress)
     return fly_and_judge(manoeuvre.configured(configuration), configuration, progress)
@@ -98,9 +110,10 @@ def fly(
 def compare(
     what: Manoeuvre | Sequence[Manoeuvre] | Rig | Path,
     *,
-    column: Pilot | None = None,
-    wheel: Pilot | None = None,
-    pedals: Pilot | None = None,
+    column: Pilot | Law | None = None,
+    wheel: Pilot | Law | None = None,
+    pedals: Pilot | Law | None = None,
+    gradient: Gradients | None = None,
     duration_s: float | None = None,
     configurations: Sequence[Configuration] | None = None,
     progress: Callable[[str, int, int], None] | None = None,
@@ -127,39 +140,41 @@ def compare(
     >>> table.to_polars()["configuration"].to_list()
     ['rigid', 'uncompensated']
     """
-    pilots = _pilots(column, wheel, pedals)
+    pilots = pilots_of(column, wheel, pedals)
     if isinstance(what, Sequence) and not isinstance(what, str):
         for manoeuvre in what:
-            _alone(manoeuvre, pilots, duration_s, terms)
+            _alone(manoeuvre, pilots, duration_s, gradient, terms)
         cases = list(what)
         if not cases:
             raise InputError("coupled.compare", "what", "needs at least one manoeuvre")
     else:
-        cases = [_manoeuvre(what, pilots, duration_s, terms)]
+        cases = [manoeuvre_of(what, pilots, duration_s, gradient, terms)]
     if configurations is not None:
         cases = [replace(case, configurations=tuple(configurations)) for case in cases]
     return compare_manoeuvres(cases, progress)
 
 
-def _pilots(
-    column: Pilot | None, wheel: Pilot | None, pedals: Pilot | None
+def pilots_of(
+    column: Pilot | Law | None, wheel: Pilot | Law | None, pedals: Pilot | Law | None
 ) -> dict[ControlName, Pilot]:
-    given: dict[ControlName, Pilot | None] = {"column": column, "wheel": wheel, "pedals": pedals}
-    return {control: pilot for control, pilot in given.items() if pilot is not None}
+    """Return the pilots given, by their controls."""
+    given = zip(CONTROL_NAMES, (column, wheel, pedals), strict=True)
+    return {control: as_pilot(pilot) for control, pilot in given if pilot is not None}
 
 
-def _manoeuvre(
+def manoeuvre_of(
     what: Manoeuvre | Rig | Path,
     pilots: Mapping[ControlName, Pilot],
     duration_s: float | None,
+    gradient: Gradients | None,
     terms: Terms,
 ) -> Manoeuvre:
     """Return the manoeuvre that keywords say."""
     if isinstance(what, Manoeuvre):
-        _alone(what, pilots, duration_s, terms)
+        _alone(what, pilots, duration_s, gradient, terms)
         return what
     name = terms.get("name", "manoeuvre")
-    words = (*CONTROL_NAMES, "duration_s", *Terms.__annotations__)
+    words = (*CONTROL_NAMES, "gradient", "duration_s", *Terms.__annotations__)
     known_keys(dict(terms), dict.fromkeys(words), name, "")
     if duration_s is None:
         raise InputError(name, "duration_s", "is missing")
@@ -169,8 +184,9 @@ def _manoeuvre(
     pressure = terms.get("dynamic_pressure_Pa")
     if isinstance(pressure, (int, float)):
         pressure = PressureProfile(time_s=[0.0], dynamic_pressure_Pa=[float(pressure)])
+    rig = what if isinstance(what, Rig) else load_rig(what)
     return Manoeuvre(
-        what if isinstance(what, Rig) else load_rig(what),
+        rig,
         pilots,
         duration_s,
         seed=terms.get("seed", 0),
@@ -178,7 +194,19 @@ def _manoeuvre(
         bench=pressure,
         record_properties=tuple(terms.get("record_properties", ())),
         name=name,
+        gradient=_laws(gradient, rig, name),
     )
+
+
+def _laws(given: Gradients | None, rig: Rig, name: str) -> Mapping[ControlName, Law]:
+    """Return the scheduling laws of a rig's controls; a function alone is that of its only one."""
+    if given is None or isinstance(given, Mapping):
+        return dict(given or {})
+    first, *others = rig.controls
+    if others:
+        problem = f"is one law for {len(others) + 1} controls; give a table, as {{{first!r}: law}}"
+        raise InputError(name, "gradient", problem)
+    return {first: given}
 
 
 def _plain(table: Any) -> Any:
@@ -192,10 +220,12 @@ def _alone(
     manoeuvre: Manoeuvre,
     pilots: Mapping[ControlName, Pilot],
     duration_s: float | None,
+    gradient: Gradients | None,
     terms: Terms,
 ) -> None:
     """Refuse keywords beside a manoeuvre, which says all itself."""
-    given = [*pilots, *(["duration_s"] if duration_s is not None else []), *terms]
+    alone = {"duration_s": duration_s, "gradient": gradient}
+    given = [*pilots, *(key for key, value in alone.items() if value is not None), *terms]
     if given:
         problem = "is said by the manoeuvre itself; change it by dataclasses.replace"
         raise InputError(manoeuvre.file, given[0], problem)

@@ -7,13 +7,13 @@ from os import PathLike, fspath
 from pathlib import Path
 
 from coupled.arguments import public
-from coupled.errors import InputError
 from coupled.resources import find, shipped_rigs
 from coupled.rig.rig import Rig, of_file
 from coupled.rig.rigfile import read_rig, rig_from_table
 from coupled.schema import loads_toml
 from coupled.surveying.draft import draft
-from coupled.surveying.survey import chosen_model, survey
+from coupled.surveying.survey import chosen_model, surveyed
+from coupled.surveying.terms import ModelTerms, list_terms
 from coupled.surveying.whole import Survey, survey_models
 
 
@@ -60,12 +60,34 @@ def models(
 
 
 @public
-def new_rig(model: str | PathLike[str], name: str = "") -> Rig:
+def terms(
+    model: str | PathLike[str],
+    run: str | PathLike[str] | None = None,
+    progress: Callable[[str, int, int], None] | None = None,
+) -> ModelTerms:
+    """Return the named functions of a JSBSim model's aerodynamics, with axis and share.
+
+    `flight.terms` of a rig scales them by name. The share is the RMS of a function over that of all
+    named functions of its axis, in the first case of a `run`; by default in a flight with a doublet
+    and a 3-2-1-1 on each surface. `model` is as in `new_rig`. Raises InputError for a model that is
+    not here, does not trim or has no named functions, and for a run of another model.
+
+    >>> import coupled
+    >>> found = coupled.terms("c172p")
+    >>> max((one for one in found if one.axis == "ROLL"), key=lambda one: one.share).term
+    'aero/coefficient/ClDa'
+    """
+    return list_terms(model, run, progress)
+
+
+@public
+def new_rig(model: str | PathLike[str], name: str = "", *, airframe_only: bool = False) -> Rig:
     """Return a first rig for a JSBSim model: where it trims, found; its loader, guessed.
 
     `model` is one that is here, or the folder of another, or its file. `name` is the rig's, by
-    default the model's. The file that `save` writes marks each guess. Raises InputError for a
-    model that is not here, does not trim, or has no control that a rig can move.
+    default the model's. `airframe_only`: it has no control. The file that `save` writes marks each
+    guess. Raises InputError for a model that is not here, does not trim, or has no control that a
+    rig can move.
 
     >>> import coupled
     >>> rig = coupled.new_rig("T37", "mine")
@@ -76,12 +98,8 @@ def new_rig(model: str | PathLike[str], name: str = "") -> Rig:
     """
     word = fspath(model)
     chosen = chosen_model(word)
-    found = survey(chosen, speeds=True)
-    if found.flight is None:
-        raise InputError(word, "", f"does not trim wherever it was tried: {found.why}")
-    if not found.controls:
-        raise InputError(word, "", f"has no control that a rig could move: {found.lacking[0]}")
-    own = str(chosen.home) if chosen.own else ""
+    found = surveyed(word, chosen, airframe_only)
     title = name or chosen.file or chosen.model
-    text, file = draft(found, title, own), Path(f"{title}.toml")
+    text = draft(found, title, str(chosen.home) if chosen.own else "", airframe_only)
+    file = Path(f"{title}.toml")
     return of_file(rig_from_table(loads_toml(text, file), file), (file, text))

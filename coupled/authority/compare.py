@@ -23,12 +23,12 @@ from numpy.typing import NDArray
 from coupled.arguments import public
 from coupled.authority.figures import remarks
 from coupled.authority.held import (
-    asked_and_reached,
-    by_the_statics,
-    felt_and_specified,
+    average_commands,
+    average_forces,
+    find_held_rows,
     loader_rests,
+    predict_at_rest,
     true_deflection,
-    where_held,
 )
 from coupled.authority.outcome import Flight, Outcome
 from coupled.display import System
@@ -166,17 +166,17 @@ def judge(
         return Outcome(manoeuvre.label, configuration, control, *(nan,) * 9, None, None, None, why)
     rests = not manoeuvre.served and loader_rests(rig, control, record)
     moved = deflection if np.any(deflection) else force
-    held = where_held(record.time_s, moved)
+    held = find_held_rows(record.time_s, moved)
     side = float(np.sign(np.mean(moved[held])))
     stop, shares = None, (nan,) * 6
     if not rests:
-        commands = asked_and_reached(rig, control, record, held)
-        felt, specified = felt_and_specified(rig, control, record, held)
+        commands = average_commands(rig, control, record, held)
+        felt, specified = average_forces(rig, control, record, held)
         stop = commands.stop
-        # The statics are those of a loader without services.
-        known = closed_forms and not manoeuvre.served
-        loss, ratio = by_the_statics(rig, control, record, held, stop) if known else (nan, nan)
-        asked, reached = commands.asked, commands.reached
+        # The statics are those of the rig's own schedule, and of a loader without services.
+        known = closed_forms and not manoeuvre.served and not manoeuvre.gradient
+        loss, ratio = predict_at_rest(rig, control, record, held, stop) if known else (nan, nan)
+        asked, reached = commands.commanded, commands.reached
         # Where a service holds the control instead of the hand, no gradient is felt.
         holds = felt * specified > 0.0 if manoeuvre.served else specified != 0.0
         ratios = (felt / specified, ratio) if holds else (nan, nan)

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import groupby
 from typing import TYPE_CHECKING
 
-from coupled.authority.held import dry_friction
-from coupled.display import System, percent, shown
+from coupled.authority.held import breakaway_force
+from coupled.display import Shown, System, drawn, parameter_label, percent, shown
 from coupled.errors import listed
 from coupled.record.channels import SURFACES, unit_of
 from coupled.rig.guesses import guess_note
-from coupled.units import DEGREE_rad, INCH_m
+from coupled.units import DEGREE_rad
 
 if TYPE_CHECKING:
     from coupled.authority.outcome import Flight, Outcome
@@ -64,21 +64,67 @@ FIGURES: tuple[Figure, ...] = (
 )
 
 
+# Of the figures that a sweep keeps, over flights of any control.
+_KEPT: dict[str, str] = {
+    "asked_norm": "surface asked",
+    "reached_norm": "surface reached",
+    "hand_travel_norm": "hand's travel",
+    "loss": "authority lost",
+    "loss_closed_form": "loss by closed form",
+    "felt_ratio": "felt over specified",
+    "felt_ratio_closed_form": "felt by closed form",
+    "force_N": "force needed",
+    "force_step_N": "force step",
+    "peak_rate_rad_per_s": "peak rate",
+    "peak_load_factor": "peak load factor",
+    "time_to_attitude_s": "time to attitude",
+    "surface_stop_norm": "surface at its stop",
+}
+
+
+def kept_figure(name: str, system: System = "si") -> Shown:
+    """Return the words, unit and factor of a column of a sweep's table: a figure, or a parameter.
+
+    A parameter stays in its SI unit, which is part of its words.
+    """
+    if name not in _KEPT:
+        return Shown("", words=parameter_label(name))
+    unit = shown(name, system)
+    written = f"{unit.unit} of travel" if name.endswith("_norm") else unit.unit
+    return replace(unit, unit=written, words=_KEPT[name])
+
+
+def cases_of(flights: Sequence[Flight]) -> list[list[Flight]]:
+    """Return the flights of each case, in their order."""
+    return [list(group) for _, group in groupby(flights, key=lambda f: f.outcome.case)]
+
+
+def flown_once(cases: Sequence[Sequence[Flight]]) -> bool:
+    """Return whether there are several cases, each flown in one configuration only."""
+    return len(cases) > 1 and all(len(case) == 1 for case in cases)
+
+
+def tabulated(flights: Sequence[Flight]) -> list[list[Flight]]:
+    """Return the flights of each table of a comparison: of each case, or all if flown once."""
+    cases = cases_of(flights)
+    return [list(flights)] if flown_once(cases) else cases
+
+
 def rows(flights: Sequence[Flight], system: System = "si") -> Iterator[tuple[str, list[str]]]:
     """Yield each figure that any of the flights has: its label, and its text for each flight."""
     manoeuvre = flights[0].manoeuvre
     rate, angle = _WORDS[manoeuvre.control]
     change = manoeuvre.measure.attitude_change / DEGREE_rad
-    size, unit = _travel(manoeuvre, system)
-    force = shown("force_N", system)
-    factors = {"hand_travel_norm": size, "force_N": force.factor, "force_step_N": force.factor}
+    travel, force = _travel(manoeuvre, system), shown("force_N", system)
+    factors = {"hand_travel_norm": travel.factor}
+    factors |= {"force_N": force.factor, "force_step_N": force.factor}
     for figure in FIGURES:
         factor = factors.get(figure.field, 1.0)
         written = [figure.written(flight.outcome, factor) for flight in flights]
         if any(text != NONE for text in written):
             yield (
                 figure.label.format(
-                    rate=rate, angle=angle, change=change, unit=unit, force=force.unit
+                    rate=rate, angle=angle, change=change, unit=travel.unit, force=force.unit
                 ),
                 written,
             )
@@ -91,12 +137,11 @@ def _end(flight: Flight) -> str:
     return f"{flight.record.time_s[-1]:.1f}" if flight.ended_early else NONE
 
 
-def _travel(manoeuvre: Manoeuvre, system: System) -> tuple[float, str]:
-    """Return the travel of the compared control, and its unit."""
+def _travel(manoeuvre: Manoeuvre, system: System) -> Shown:
+    """Return the travel of the compared control as a factor, and its unit."""
+    unit = drawn(f"travel_{unit_of(manoeuvre.control)}", system, fine=True)
     travel = manoeuvre.rig.controls[manoeuvre.control].travel
-    if unit_of(manoeuvre.control) == "rad":
-        return travel / DEGREE_rad, "°"
-    return (travel / INCH_m, "in") if system == "us" else (1000.0 * travel, "mm")
+    return replace(unit, factor=unit.factor * travel)
 
 
 def corrects_nothing(flight: Flight) -> bool:
@@ -126,8 +171,8 @@ def remarks(flights: Sequence[Flight], system: System = "si") -> list[str]:
     authority under a force that moves the surface as far as on the rigid rig, and the numbers of
     the rig that are guesses.
     """
-    cases = [list(group) for _, group in groupby(flights, key=lambda f: f.outcome.case)]
-    held = next(filter(None, (further(case, system) for case in cases)), "")
+    cases = cases_of(flights)
+    held = next(filter(None, (explain_loss(case, system) for case in cases)), "")
     said = [_without_correction(flights), *_resting(cases, system), *_saturated(cases), held]
     said.append(guessed(flights))
     return list(filter(None, said))
@@ -187,7 +232,7 @@ def _resting(cases: Sequence[Sequence[Flight]], system: System) -> Iterator[str]
         if not some:
             continue
         loader = some[0].manoeuvre.rig.controls[some[0].manoeuvre.control].loader
-        rubs = dry_friction(loader)
+        rubs = breakaway_force(loader)
         pull = max(flight.outcome.force_N for flight in some)
         force, breakout, friction = (
             f"{unit.factor * each:.3g} {unit.unit}" for each in (pull, loader.breakout, rubs)
@@ -231,7 +276,7 @@ def _saturated(cases: Sequence[Sequence[Flight]]) -> Iterator[str]:
         )
 
 
-def further(case: Sequence[Flight], system: System = "si") -> str:
+def explain_loss(case: Sequence[Flight], system: System = "si") -> str:
     """Return why authority is lost under a force that moves the surface as on the rigid rig.
 
     Empty if the hand does not hold a force, or moves no further for it.
@@ -243,23 +288,23 @@ def further(case: Sequence[Flight], system: System = "si") -> str:
     moved = [
         flight.outcome
         for flight in case
-        if _feels_too_soft(flight.manoeuvre)
+        if _is_uncorrected(flight.manoeuvre)
         and abs(flight.outcome.hand_travel_norm) - abs(rigid.hand_travel_norm) > _NOTICED
         and flight.outcome.loss > 0.0
     ]
     if not moved:
         return ""
-    bent, alike = moved[0], goes_as_far(moved[0], rigid)
-    size, unit = _travel(manoeuvre, system)
+    bent, alike = moved[0], moves_surface_alike(moved[0], rigid)
+    full = _travel(manoeuvre, system)
     where = f" ({bent.case})" if manoeuvre.label != manoeuvre.name else ""
-    travels = [size * abs(each.hand_travel_norm) for each in (*moved, rigid)]
-    digits = _digits_between(travels[:-1], travels[-1], 1 if unit == "in" else 0)
-    written = [f"{travel:.{digits}f} {unit}" for travel in travels]
+    travels = [full.factor * abs(each.hand_travel_norm) for each in (*moved, rigid)]
+    digits = _digits_between(travels[:-1], travels[-1], 1 if full.unit == "in" else 0)
+    written = [f"{travel:.{digits}f} {full.unit}" for travel in travels]
     places = (written[0], written[-1])
     others = [
         f"{each.configuration} {written[number]} and {percent(each.loss, 0)}"
         for number, each in enumerate(moved[1:], start=1)
-        if goes_as_far(each, rigid) is alike
+        if moves_surface_alike(each, rigid) is alike
     ]
     surface = "the surface goes about as far, while" if alike else "and"
     more = f" Likewise {listed(others)}." if others else ""
@@ -290,7 +335,7 @@ def sweep_remarks(manoeuvre: Manoeuvre, configurations: Sequence[Configuration])
     useless = [name for name, each in flown.items() if _corrects_nothing(each)]
     if useless:
         said.append(_says_no_correction(manoeuvre, useless))
-    if holds_force(manoeuvre) and any(_feels_too_soft(each) for each in flown.values()):
+    if holds_force(manoeuvre) and any(_is_uncorrected(each) for each in flown.values()):
         said.append(
             "The pilot holds a force: on a structure that bends, the hand goes further for it, and"
             " without correction the surface goes about as far as on a rigid one. What is lost is a"
@@ -299,7 +344,7 @@ def sweep_remarks(manoeuvre: Manoeuvre, configurations: Sequence[Configuration])
     return said
 
 
-def _feels_too_soft(manoeuvre: Manoeuvre) -> bool:
+def _is_uncorrected(manoeuvre: Manoeuvre) -> bool:
     """Tell whether a control bends and its host corrects neither gradient nor deflection."""
     host = manoeuvre.rig.controls[manoeuvre.control].compensation
     return _bends(manoeuvre) and (host.bend == 0.0 or not (host.gradient or host.deflection))
@@ -311,6 +356,6 @@ def holds_force(manoeuvre: Manoeuvre) -> bool:
     return pilot is not None and pilot.kind in _FORCES
 
 
-def goes_as_far(bent: Outcome, rigid: Outcome) -> bool:
+def moves_surface_alike(bent: Outcome, rigid: Outcome) -> bool:
     """Tell whether a surface moves about as far as on the rigid rig."""
     return abs(bent.reached_norm - rigid.reached_norm) <= _ALIKE * abs(rigid.reached_norm)

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from coupled.authority.compare import fly_and_judge
-from coupled.authority.held import dry_friction
+from coupled.authority.held import breakaway_force
 from coupled.authority.outcome import Flight
 from coupled.errors import InputError
 from coupled.flight.manoeuvre import Manoeuvre, PressureProfile
@@ -92,9 +92,9 @@ def _case(
 ) -> _Case | None:
     """Return a case with the greatest force that flies, or nothing."""
     data = rig.controls[control]
-    least = _LEAST * (data.loader.breakout + dry_friction(data.loader))
+    least = _LEAST * (data.loader.breakout + breakaway_force(data.loader))
     travel = _SHARE * data.travel
-    force = float(specified_force(rig, control, pressure_Pa, np.asarray(travel))) + dry_friction(
+    force = float(specified_force(rig, control, pressure_Pa, np.asarray(travel))) + breakaway_force(
         data.loader
     )
     there = rig.changed({_SPEED: speed}) if speed else rig
@@ -109,7 +109,7 @@ def _case(
             flown = Manoeuvre(there, {control: pull}, _DURATION_s, bench=bench, label=label)
             try:
                 flights.append(fly_and_judge(flown.configured(configuration), configuration))
-            except InputError:  # no trim, where a search by steps found one beside it
+            except InputError:  # no trim at this speed, though at one found by steps
                 return None
             if flights[-1].ended_early:
                 break

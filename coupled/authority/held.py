@@ -36,7 +36,7 @@ class Commands:
     `stop` is the command at the surface's stop if more is commanded, else None.
     """
 
-    asked: float
+    commanded: float
     reached: float
     stop: float | None
 
@@ -66,15 +66,15 @@ def loader_rests(rig: Rig, control: ControlName, record: Record) -> bool:
     net = record[channel(control, "hand_force")] + loader.offset
     if rig.flight is not None:
         net = net - loader.bob_weight * (record["load_factor"] - 1.0)
-    return float(np.max(np.abs(net))) <= loader.breakout + dry_friction(loader)
+    return float(np.max(np.abs(net))) <= loader.breakout + breakaway_force(loader)
 
 
-def dry_friction(loader: Loader) -> float:
+def breakaway_force(loader: Loader) -> float:
     """Return the breakaway force of a loader's dry friction, N."""
     return max(loader.friction, loader.breakaway, loader.friction_pull, loader.friction_push)
 
 
-def by_the_statics(
+def predict_at_rest(
     rig: Rig,
     control: ControlName,
     record: Record,
@@ -105,12 +105,14 @@ def by_the_statics(
     preload = math.copysign(loader.breakout, deflection)
     felt = float(point.force[0]) - preload - loader.bob_weight * (load - 1.0)
     specified = float(point.specified[0]) - preload
-    asked = _as_far_as(_commands(rig, control, np.array([deflection])), stop)
-    loss = 1.0 - float(_as_far_as(point.command, stop)[0] / asked[0])
+    commanded = _limit_to_stop(_commands(rig, control, np.array([deflection])), stop)
+    loss = 1.0 - float(_limit_to_stop(point.command, stop)[0] / commanded[0])
     return loss, felt / specified if specified else float("nan")
 
 
-def held_forces(manoeuvre: Manoeuvre, control: ControlName, record: Record) -> tuple[float, float]:
+def average_held_forces(
+    manoeuvre: Manoeuvre, control: ControlName, record: Record
+) -> tuple[float, float]:
     """Return the mean force felt and specified while a control is held, N; NaN if it never moves.
 
     Breakout and bob weight are subtracted from both.
@@ -118,11 +120,11 @@ def held_forces(manoeuvre: Manoeuvre, control: ControlName, record: Record) -> t
     deflection = true_deflection(manoeuvre.rig, control, record)
     if len(record) < 2 or not np.any(deflection):
         return float("nan"), float("nan")
-    held = where_held(record.time_s, deflection)
-    return felt_and_specified(manoeuvre.rig, control, record, held)
+    held = find_held_rows(record.time_s, deflection)
+    return average_forces(manoeuvre.rig, control, record, held)
 
 
-def where_held(time_s: Floats, deflection: Floats) -> NDArray[np.bool_]:
+def find_held_rows(time_s: Floats, deflection: Floats) -> NDArray[np.bool_]:
     """Return the rows at which the control is held: far out on the peak's side, and still.
 
     Still is a speed under 5 % of the peak a second, over ±0.1 s, which tolerates transducer noise.
@@ -145,28 +147,30 @@ def _commands(rig: Rig, control: ControlName, deflection: Floats) -> Floats:
     return COMMAND_SIGN[data.surface] * share_of_travel(data, deflection)
 
 
-def _as_far_as(commands: Floats, stop: float | None) -> Floats:
+def _limit_to_stop(commands: Floats, stop: float | None) -> Floats:
     """Return commands in ±1, limited to the stop of the surface on its side."""
     low = stop if stop is not None and stop <= 0.0 else -1.0
     high = stop if stop is not None and stop > 0.0 else 1.0
     return np.asarray(np.clip(commands, low, high))
 
 
-def asked_and_reached(
+def average_commands(
     rig: Rig, control: ControlName, record: Record, held: NDArray[np.bool_]
 ) -> Commands:
     """Return the mean surface commands for the deflection, and reached, in ±1."""
-    asked = _commands(rig, control, true_deflection(rig, control, record)[held])
+    commanded = _commands(rig, control, true_deflection(rig, control, record)[held])
     reached = record[channel(control, "surface_norm")]
-    stop = _surface_stop(rig, control, record, held, float(np.mean(asked)))
-    if stop is None or abs(float(np.mean(asked))) <= abs(stop):
-        return Commands(float(np.mean(np.clip(asked, -1, 1))), float(np.mean(reached[held])), None)
-    means = [float(np.mean(_as_far_as(each, stop))) for each in (asked, reached[held])]
+    stop = _surface_stop(rig, control, record, held, float(np.mean(commanded)))
+    if stop is None or abs(float(np.mean(commanded))) <= abs(stop):
+        return Commands(
+            float(np.mean(np.clip(commanded, -1, 1))), float(np.mean(reached[held])), None
+        )
+    means = [float(np.mean(_limit_to_stop(each, stop))) for each in (commanded, reached[held])]
     return Commands(means[0], means[1], stop)
 
 
 def _surface_stop(
-    rig: Rig, control: ControlName, record: Record, held: NDArray[np.bool_], asked: float
+    rig: Rig, control: ControlName, record: Record, held: NDArray[np.bool_], commanded: float
 ) -> float | None:
     """Return the command at the surface's stop on the commanded side; None if unknown.
 
@@ -178,26 +182,26 @@ def _surface_stop(
     surface = SURFACES[control]
     stops = record.manifest.get("surface_stops", {}).get(surface)
     rows = np.flatnonzero(held[:-1])  # a row's command moves the surface of the next
-    known = stops["positive" if asked > 0.0 else "negative"] if stops else None
+    known = stops["positive" if commanded > 0.0 else "negative"] if stops else None
     if known is None or not len(rows):
         return None
     stop, name = float(known["command_norm"]), f"{surface}_rad"
     reached = np.abs(record[channel(control, "surface_norm")][rows])
     slack = data.rigging.play + 1e-4
 
-    def stands(of: NDArray[np.int64]) -> bool:
+    def is_at_stop(of: NDArray[np.int64]) -> bool:
         within = _AT_STOP_rad + _SIGMAS * rig.noise.get(name, 0.0) / math.sqrt(len(of))
         return bool(abs(np.mean(record[name][of + 1]) - known["position_rad"]) <= within)
 
-    if np.mean(reached) < abs(stop) - slack and stands(rows):
-        return math.copysign(float(np.min(reached)), asked)
+    if np.mean(reached) < abs(stop) - slack and is_at_stop(rows):
+        return math.copysign(float(np.min(reached)), commanded)
     beyond = rows[reached > abs(stop) + slack]
-    if len(beyond) and not stands(beyond):
+    if len(beyond) and not is_at_stop(beyond):
         return None
     return stop
 
 
-def felt_and_specified(
+def average_forces(
     rig: Rig, control: ControlName, record: Record, held: NDArray[np.bool_]
 ) -> tuple[float, float]:
     """Return the mean force felt and specified, without breakout and bob weight, N.

@@ -13,11 +13,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import polars as pl
 from numpy.typing import NDArray
 
 from coupled.errors import InputError
 from coupled.flight.aircraft import make_aircraft
 from coupled.flight.airframe import JSBSimAirframe
+from coupled.flight.altered import STILL
 from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import CONFIGURATIONS, Configuration, configure
 from coupled.flight.runfile import read_run
@@ -72,6 +74,18 @@ class Feel:
     pressure_Pa: Floats
     per_g_N: dict[Configuration, Floats]
     per_knot_N: dict[Configuration, Floats]
+
+    def to_polars(self) -> pl.DataFrame:
+        """Return a row for each speed, in SI; null where there is no force."""
+        columns = {
+            "calibrated_airspeed_m_per_s": self.calibrated_airspeed_m_per_s,
+            "dynamic_pressure_Pa": self.pressure_Pa,
+        }
+        for name in FELT:
+            word = "specified" if name == "rigid" else name
+            columns[f"{word}_force_per_g_N"] = self.per_g_N[name]
+            columns[f"{word}_pull_per_knot_N"] = self.per_knot_N[name]
+        return pl.DataFrame(columns).fill_nan(None)
 
 
 def loss_maps(rig: Rig, control: ControlName) -> list[LossMap]:
@@ -225,7 +239,7 @@ def _elevator_per(rig: Rig, file: Path, speed: float) -> tuple[float, float, flo
 
 def _trimmed(rig: Rig, file: Path, speed: float) -> JSBSimAirframe:
     assert rig.flight is not None
-    level = {"calibrated_airspeed_m_per_s": speed, "flight_path_rad": 0.0, "gust_rms_m_per_s": 0.0}
+    level = {"calibrated_airspeed_m_per_s": speed, "flight_path_rad": 0.0, **STILL}
     flight = changed(rig.flight, level, file, "flight")
     return make_aircraft(
         flight, 1.0 / rig.frame_rate, list(rig.controls), [aircraft_folder()], file

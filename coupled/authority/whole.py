@@ -74,6 +74,7 @@ def map_rig(
         if progress is not None:
             progress(what, done, total)
 
+    rig.check_controlled(rig.file)
     flown = shipped_flights(rig, tell) if records is None else list(records)
     felt = feel(rig, rig.file or Path(rig.name), tell)
     maps = {}

@@ -60,6 +60,7 @@ def calibrate(
     """
     if not isinstance(rig, Rig):
         rig = read_rig(find(str(rig), shipped_rigs(), "rig"))
+    rig.check_controlled(rig.file)
     if control not in rig.controls:
         problem = f"the rig has no {control}; {nearest(control, rig.controls)}"
         raise InputError(rig.name, "controls", problem)

@@ -81,6 +81,7 @@ def document_rig(
     lacks the control, or a file cannot be used.
     """
     file = rig.file or Path(rig.name)
+    rig.check_controlled(file)
     if control is not None and control not in rig.controls:
         raise InputError(file, "control", f"no {control!r}; {nearest(control, rig.controls)}")
     chosen = controls_of(rig) if control is None else [control]

@@ -1,19 +1,23 @@
 """Mass, damping and lead scheduled by the gradient, so that a release is as specified.
 
-Eq. (12) makes the loader oscillate faster than specified, and a released control springs back by
-the bend of its structure at once: to δ·(1 − K·G_T), from rest. The specified, rigid control passes
-90 % of its displacement with some speed, and Part 60 counts from there. So
+Eq. (12) makes the loader oscillate faster than specified, and the structure of a released control
+springs back at once: the grip is at δ·(1 − K·G_T), at rest. The specified, rigid control moves
+there. Part 60 counts the time from 90 % of the displacement. So
 
-    f_m = f_c = 1/(1 − K̂·G_T)                   frequency and damping ratio as specified
-    T ≈ √(2·K̂·G_T − (K̂·G_T)²)·√(m/G_T)         the speed that an undamped motion has there
+    f_m = f_c = 1/(1 − K̂·G_T)      frequency and damping ratio as specified
+    T                              such that the first zero crossing is 6 % late (`LATE`)
 
-T is found in simulation such that the first zero crossing is at the specified time, since the
-servo's lag requires more. An overdamped control needs none.
+T is found by simulation, as it depends on damping and servo. Without both, and for K·G_T of at
+least 0.1, the grip is below 90 % at once. The specified control crosses zero asin(0.9)/ω after its
+90 %, with ω = √(G_T/m). The remedied loader starts with the speed T·G_T·δ·(1 − K·G_T)/m and
+crosses after atan(1/(T·ω))/ω, so that
+
+    T = √(m/G_T)·cot(1.06·asin 0.9) = 0.40·√(m/G_T)
+
+with the filed mass m. Damping requires less, a servo's lag more. An overdamped control needs none.
 """
 
 from __future__ import annotations
-
-import math
 
 from scipy.optimize import brentq
 
@@ -53,11 +57,6 @@ def with_rows(rig: Rig, control: ControlName, rows: list[Row]) -> Rig:
             f"{key}.force_lead_s": [float(f"{lead:.4g}") for *_, lead in rows],
         }
     )
-
-
-def estimated_lead(mass: float, gradient: float, share: float) -> float:
-    """Return T in s without damping and servo, for K·G_T = `share`."""
-    return math.sqrt(share * (2.0 - share) * mass / gradient)
 
 
 def _row(rig: Rig, control: ControlName, pressure: float, specified: Rig) -> Row:

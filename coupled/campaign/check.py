@@ -14,6 +14,7 @@ from coupled.campaign.verdict import Verdict, in_full, judge_expectation
 from coupled.errors import InputError
 from coupled.flight.expectation import LATENCIES, Expect, UnjudgedError
 from coupled.flight.manoeuvre import Configuration, Manoeuvre
+from coupled.flight.pilot.own import Law, given_laws
 from coupled.flight.runfile import read_run
 from coupled.results import TableResult, frame_of
 
@@ -76,12 +77,17 @@ class CheckResult(TableResult):
 def check(
     runs: str | Path | Sequence[str | Path | Sequence[Manoeuvre]],
     progress: Progress | None = None,
+    *,
+    column: Law | None = None,
+    wheel: Law | None = None,
+    pedals: Law | None = None,
 ) -> CheckResult:
     """Fly runs and compare them with their expectations.
 
     `runs` is a run file, the name of a shipped one, or several; a run may also be given as its
     cases. Only the configurations with expectations are flown. `progress` is called with a text,
-    frames done and frames in all. Raises InputError for a run without expectations.
+    frames done and frames in all. A function on `column`, `wheel` or `pedals` is the pilot in
+    place of the run's, as in `fly`. Raises InputError for a run without expectations.
 
     >>> import coupled
     >>> coupled.check("appendix-c").passed
@@ -93,6 +99,8 @@ def check(
     read = [
         read_expecting(str(r)) if isinstance(r, (str, Path)) else _expecting(r) for r in several
     ]
+    own = given_laws(column, wheel, pedals, "coupled.check")
+    read = [[replace(each, pilots={**each.pilots, **own}) for each in run] for run in read]
     return CheckResult(tuple(v for scenarios in read for v in check_run(scenarios, progress)))
 
 

@@ -117,7 +117,11 @@ def _fly_block(packed: bytes, flights: Sequence[PlannedFlight]) -> tuple[list[Jo
 @lru_cache(maxsize=1)
 def _unpacked(packed: bytes) -> tuple[SweepPlan, AircraftCache]:
     """Return a plan, and this worker's cache of aircraft."""
-    return pickle.loads(packed), AircraftCache()
+    try:
+        return pickle.loads(packed), AircraftCache()
+    except (AttributeError, ImportError) as error:
+        problem = f"a function of the sweep is not found by its workers ({error}); define it in a"
+        raise InputError("coupled.sweep", "", f"{problem} module that they can import") from None
 
 
 def table(plan: SweepPlan, entries: Sequence[JournalEntry]) -> pl.DataFrame:

@@ -24,6 +24,7 @@ from coupled.flight.conditions import Conditions
 from coupled.flight.expectation import UnjudgedError
 from coupled.flight.manoeuvre import Manoeuvre
 from coupled.flight.pilot import Attitude, Clamp, Track
+from coupled.flight.pilot.own import OwnPilot
 from coupled.record.channels import RATE, ControlName, channel
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
@@ -99,11 +100,11 @@ def latency_s(control: ControlName, flight: Flight, reference: Flight) -> float:
 
 def _check_flight(control: ControlName, manoeuvre: Manoeuvre) -> None:
     pilot = manoeuvre.pilots.get(control)
-    if pilot is None or isinstance(pilot, Attitude | Clamp | Track):
+    if pilot is None or isinstance(pilot, Attitude | Clamp | Track | OwnPilot):
         problem = f"latency needs a force on the {control} that the rig does not change"
         raise UnjudgedError(f"{problem}: step, ramp, doublet, 3211, sweep or table")
     flight = manoeuvre.rig.flight
-    if manoeuvre.conditions != Conditions() or (flight is not None and flight.gust_rms > 0.0):
+    if manoeuvre.conditions != Conditions() or (flight is not None and not flight.still):
         raise UnjudgedError("latency is measured in still air and without events")
 
 

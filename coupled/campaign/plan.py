@@ -9,8 +9,9 @@ from __future__ import annotations
 import copy
 import hashlib
 import json
+import pickle
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
@@ -26,10 +27,16 @@ from coupled.files import sha256
 from coupled.flight.loop import make_airframe
 from coupled.flight.manifest import input_files
 from coupled.flight.manoeuvre import Configuration, Manoeuvre
+from coupled.flight.pilot import Pilot
+from coupled.flight.pilot.own import check_pickled
 from coupled.flight.runfile import manoeuvres_from_table
+from coupled.record.channels import ControlName
 from coupled.resources import find_named, shipped_runs
 from coupled.rig.rigfile import change
 from coupled.schema import load_toml
+
+# Tables whose keys are names in the aircraft's model.
+_OF_MODEL = ("flight.properties.", "flight.terms.")
 
 
 @dataclass(frozen=True)
@@ -47,7 +54,10 @@ class PlannedFlight:
 
 @dataclass(frozen=True)
 class SweepPlan:
-    """A sweep ready to fly: `table` are the run's tables, `files` all input files."""
+    """A sweep ready to fly: `table` are the run's tables, `files` all input files.
+
+    `own` are pilots in place of the run's, which no file describes.
+    """
 
     sweep: SweepFile
     file: Path
@@ -55,6 +65,7 @@ class SweepPlan:
     table: Mapping[str, Any]
     identity: str
     files: frozenset[Path] = frozenset()
+    own: Mapping[ControlName, Pilot] = field(default_factory=dict)
 
     @property
     def keys(self) -> list[str]:
@@ -70,7 +81,18 @@ class SweepPlan:
 
     def scenario(self, changes: Mapping[str, Any]) -> Manoeuvre:
         """Return the run's case with changed values, by their dotted keys."""
-        return _changed(self.table, self.run_file, self.sweep.case, changes)
+        found = _changed(self.table, self.run_file, self.sweep.case, changes)
+        return replace(found, pilots={**found.pilots, **self.own}) if self.own else found
+
+    def flown_by(self, own: Mapping[ControlName, Pilot]) -> SweepPlan:
+        """Return the sweep with pilots in place of the run's, each of which can be pickled."""
+        if not own:
+            return self
+        check_pickled(own, "coupled.sweep")
+        sweep = replace(self, own=own)
+        sweep.scenario({})  # refuses a control that the rig lacks
+        digest = hashlib.sha256(self.identity.encode() + pickle.dumps(dict(own)))
+        return replace(sweep, identity=digest.hexdigest())
 
 
 def read_plan(file: Path) -> SweepPlan:
@@ -162,8 +184,8 @@ def _check_keys(
         for value in values:
             try:
                 scenario = try_changes(dict.fromkeys((vary.key, *vary.also), value))
-                if value is values[0] and "flight.properties." in vary.key:
-                    _check_property(scenario, vary.key)
+                if value is values[0] and any(table in vary.key for table in _OF_MODEL):
+                    _check_name(scenario, vary.key)
             except InputError as error:
                 faults.append(_blamed(vary, i, value, error, file, try_changes))
                 break
@@ -197,8 +219,8 @@ def _blamed(
     return InputError(file, place, f"{key} = {value!r}: {named}{error.problem}")
 
 
-def _check_property(scenario: Manoeuvre, key: str) -> None:
-    """Refuse a property that the aircraft lacks; a failure to trim is a row of the table."""
+def _check_name(scenario: Manoeuvre, key: str) -> None:
+    """Refuse a name that the aircraft's model lacks; a failure to trim is a row of the table."""
     try:
         make_airframe(scenario)
     except InputError as error:

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from coupled.authority.compare import Flight
-from coupled.authority.held import held_forces
+from coupled.authority.held import average_held_forces
 from coupled.campaign.latency import latency_s
 from coupled.campaign.tolerances import (
     LONG_TERM_N,
@@ -75,7 +75,7 @@ def judge_standard(
         assert reference is not None
         late_s = latency_s(looked_at, flight, reference)
         return StandardFigure(late_s, None, LATENCY_s[standard])
-    felt, specified = held_forces(flight.manoeuvre, looked_at, flight.record)
+    felt, specified = average_held_forces(flight.manoeuvre, looked_at, flight.record)
     allowed = float(force_band(looked_at, specified))
     return StandardFigure(felt, specified - allowed, specified + allowed)
 

@@ -19,6 +19,7 @@ from coupled.campaign.plan import SweepPlan, plan_from_table, planned_flights, r
 from coupled.campaign.sensitivity import SobolIndex, sensitivity
 from coupled.campaign.survival import SurvivalLimit, limits
 from coupled.errors import InputError
+from coupled.flight.pilot.own import Law, given_laws
 from coupled.parallel import cores, executor
 from coupled.record import csvfile
 from coupled.resources import find, shipped_sweeps
@@ -83,6 +84,10 @@ def sweep(
     cluster: str = "",
     progress: Progress | None = None,
     begun: Callable[[int, int], None] | None = None,
+    *,
+    column: Law | None = None,
+    wheel: Law | None = None,
+    pedals: Law | None = None,
 ) -> SweepResult:
     """Fly a run over values of its parameters, and return a row for each flight.
 
@@ -90,8 +95,9 @@ def sweep(
     flight is stored when it is done, and a later call continues there; by default nothing is
     stored. `workers` are processes (default: all cores; 1 flies in this process), `cluster` the
     address of a dask scheduler. `progress` is called with a text, flights done and to do; `begun`
-    once, with the flights in the folder and those of the sweep. Raises InputError for an invalid
-    sweep, or a folder with another.
+    once, with the flights in the folder and those of the sweep. A function on `column`, `wheel` or
+    `pedals` is the pilot in place of the run's, as in `fly`; it must be one that can be pickled.
+    Raises InputError for an invalid sweep, or a folder with another.
 
     >>> import coupled
     >>> bends = {"key": "rig.controls.column.loader.bend_m_per_N", "values": [1e-5, 9e-5]}
@@ -111,6 +117,7 @@ def sweep(
         plan = plan_from_table(plan, Path("sweep"))
     elif not isinstance(plan, SweepPlan):
         plan = read_plan(find(str(plan), shipped_sweeps(), "sweep"))
+    plan = plan.flown_by(given_laws(column, wheel, pedals, "coupled.sweep"))
     with ExitStack() as stack:
         kept = Path(folder) if folder is not None else None
         place = kept or Path(stack.enter_context(tempfile.TemporaryDirectory())) / "sweep"

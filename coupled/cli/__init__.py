@@ -1,4 +1,4 @@
-"""The command line: parses, calls, prints. A module a group of commands."""
+"""The command line: parses, calls and prints. Each module has a group of commands."""
 
 from coupled.cli import (
     bench,

@@ -1,8 +1,8 @@
-"""The command line's frame: the app, its exit codes, and the options that commands share.
+"""The app of the command line, its exit codes, and the options that commands share.
 
-Exit code 0 when all went well, 1 when a flight ended before its time, 2 for input that
-cannot be used or a place that cannot be written (one line says why, and no output is left
-in part), 130 and 143 when it was interrupted, 141 when the reader of its output has gone.
+Exit code 0 is success, 1 a flight that ended early, 2 unusable input or an output that cannot be
+written (with one line of reason and no partial output), 130 and 143 an interruption, 141 a closed
+pipe of the output.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ from coupled.cli.process import (
     PIPE_CLOSED,
     REFUSED,
     Stop,
+    error_text,
     prepare_streams,
     prepare_threads,
     prepare_warnings,
-    said_of,
     silence_streams,
 )
 from coupled.cli.terminal import ReaderGoneError, err, out, say_error
@@ -44,7 +44,7 @@ app = typer.Typer(
 )
 
 _FAULTS = 3000  # characters of a file's faults that are printed
-_GARBAGE = 100_000  # a command is short: its garbage is looked for less often
+_GARBAGE = 100_000  # a command is short: garbage is collected less often
 
 RunArgument = Annotated[
     str, typer.Argument(help="A run file, or the name of a shipped one (coupled runs).")
@@ -93,10 +93,10 @@ def main() -> None:
     with Stop() as stop:
         try:
             code = _run()
-        except KeyboardInterrupt:  # a second one, while the first was dealt with
+        except KeyboardInterrupt:  # a second interruption, during the first
             code = INTERRUPTED
         except Exception:
-            if not stop.asked:  # a library that is interrupted as it loads raises what it likes
+            if not stop.received:  # a library interrupted while it loads may raise any exception
                 raise
             code = INTERRUPTED
     silence_streams()
@@ -116,13 +116,13 @@ def _run() -> int:
         return PIPE_CLOSED
     except InputError as error:
         line = _lines_of(error)
-    except TyperException as error:  # a word of the command line that it does not know
+    except TyperException as error:  # an unknown word of the command line
         words = " ".join(error.format_message().split()).replace("Value error, ", "")
         if not words:  # a group without a command: its help has been printed
             return 0
         line = shown(words, 400) + " (coupled --help shows what there is)"
     except (OSError, MemoryError) as error:
-        line = said_of(error)
+        line = error_text(error)
     with contextlib.suppress(OSError):
         for each in line.split("\n"):
             say_error(each)
@@ -130,14 +130,14 @@ def _run() -> int:
 
 
 def check_cluster(workers: int | None, cluster: str) -> tuple[int, str]:
-    """Return the number of workers, 0 for one a core, and the address of a cluster or ""."""
+    """Return the number of workers, 0 for one per core, and the address of a cluster or ""."""
     if cluster and workers is not None:
         raise InputError("--workers", "", "a cluster has its own; leave it out")
     return workers or 0, cluster
 
 
 def _lines_of(error: InputError) -> str:
-    """Return the faults of a file, a line each; how many more there are where that is long."""
+    """Return the faults of a file, one line each; of a long list the number of the rest."""
     lines = [str(one) for one in error.every]
     kept = lines[:1]
     for line in lines[1:]:

@@ -1,4 +1,4 @@
-"""The command of the virtual bench: bench."""
+"""The command `bench`: a simulated calibration bench."""
 
 from __future__ import annotations
 
@@ -110,11 +110,12 @@ def bench(
 
 def _repeat(made: CalibrationBench, repeat: int, seed: int, json_file: str) -> None:
     from coupled.calibration.coverage import measure_coverage
-    from coupled.cli.tables.calibration import print_coverage
+    from coupled.cli.tables import print_table
+    from coupled.tables.calibration import coverage_table
 
     with progress() as advance:
         workers = min(os.cpu_count() or 1, 8, -(-repeat // 50))
         coverage = measure_coverage(made, repeat, seed, workers, advance)
     if json_file != "-":
-        print_coverage(out, coverage)
+        print_table(out, coverage_table(coverage))
     give_json(coverage.as_dict(), json_file)

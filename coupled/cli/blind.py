@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -14,6 +14,9 @@ from coupled.cli.terminal import check_json, keep_json, out, print_json, say
 from coupled.errors import InputError
 from coupled.files import check_target
 from coupled.outputs import Outputs
+
+if TYPE_CHECKING:
+    from coupled.blind.trials.result import Score
 
 blind = typer.Typer(no_args_is_help=True, help="Make sealed trials, and score their diagnoses.")
 app.add_typer(blind, name="blind")
@@ -42,7 +45,7 @@ def make(
         str, typer.Option(metavar="ADDRESS", help="A dask scheduler's, to make them there.")
     ] = "",
 ) -> None:
-    """Write sealed records of an independent twin, with and without effects; the key elsewhere."""
+    """Write sealed records of an independent twin, with and without effects, and their key."""
     from coupled.blind.trials.make import make as make_trials
 
     processes, address = check_cluster(workers, cluster)
@@ -92,7 +95,6 @@ def score(
     from coupled.blind.trials.answers import read_answers
     from coupled.blind.trials.key import SEAL, check_seal, read_key
     from coupled.blind.trials.score import score as score_answers
-    from coupled.cli.tables.trials import print_score
 
     sealed = seal or key.with_name(key.name.removesuffix(".json").removesuffix(".key")) / SEAL
     inputs = [key, sealed, *diagnoses.glob("*.json")]
@@ -113,7 +115,23 @@ def score(
             save(draw_score(found), outputs.at(figure))
         keep_json(found.as_dict(), json_file, outputs)
     if json_file != "-":
-        print_score(out, found)
+        _print(found)
         if figure is not None:
             say(f"figure: {figure}")
     print_json(found.as_dict(), json_file)
+
+
+def _print(found: Score) -> None:
+    """Print a score: shares with their exact intervals, power, and the confusions."""
+    from coupled.cli.tables import print_table
+    from coupled.tables.trials import confusion_table, detection_table, score_table
+
+    print_table(out, score_table(found))
+    stated = found.probabilities
+    if stated.brier is not None:
+        out.print(f"\nBrier score of {stated.effects} probabilities: {stated.brier:.3f}")
+    if found.missing:
+        out.print(f"[yellow]without a diagnosis:[/] {found.missing} of {found.records}")
+    for table in (detection_table(found), confusion_table(found)):
+        out.print()
+        print_table(out, table)

@@ -1,4 +1,4 @@
-"""The command that calibrates from readings, or plans them: calibrate."""
+"""The command `calibrate`: calibrates from readings, or plans them."""
 
 from __future__ import annotations
 
@@ -30,6 +30,9 @@ from coupled.record.channels import ControlName, unit_of
 
 if TYPE_CHECKING:
     from coupled.calibration.estimate import Instruments
+    from coupled.calibration.plan import DeflectionNeeds
+    from coupled.calibration.planned import ReadingsPlan
+    from coupled.calibration.result import CalibrationResult
     from coupled.rig.rig import Rig
 
 
@@ -107,7 +110,7 @@ def calibrate(
 
 
 def _say_default(rig: str) -> None:
-    """Say whose values were taken where no rig was named."""
+    """Print which rig's values are used if none is named."""
     if not rig:
         say_note(f"no --rig given: travel, arc, gains and gradients are {DEFAULT_RIG}'s")
 
@@ -127,7 +130,6 @@ def _calibrate(
         with_calibration,
     )
     from coupled.calibration.readingsfile import read_readings
-    from coupled.cli.tables.calibration import print_calibration
     from coupled.rig.rigfile import rig_from_table
     from coupled.rig.rigwrite import rig_text
     from coupled.schema import loads_toml
@@ -165,7 +167,7 @@ def _calibrate(
                 note,
             )
     if json_file != "-":
-        print_calibration(out, found, units)
+        _print_results(found, units)
         if write is not None:
             unstated = unstated_scales(data.controls[name], found)
             if unstated and not hardware:
@@ -185,7 +187,6 @@ def _plan(
     units: System,
 ) -> None:
     from coupled.calibration.planned import plan_readings
-    from coupled.cli.tables.calibration import print_plan
 
     (file, rig, control), (write, json_file) = of_rig, targets
     share, strongest, looks, crossed = wanted
@@ -201,7 +202,7 @@ def _plan(
             write_text(outputs.at(write), found.form(units))
         keep_json(found.as_dict(), json_file, outputs)
     if json_file != "-":
-        print_plan(out, found, units)
+        _print_plan(found, units)
         for name, half in found.others.items():
             force, bend = (in_system(u, units) for u in ("N", f"{unit_of(control)}/N"))
             held_at = f"±{force.factor * crossed:.4g} {force.unit}"
@@ -210,3 +211,52 @@ def _plan(
         if write is not None:
             say(f"form: {write}")
     print_json(found.as_dict(), json_file)
+
+
+def _print_results(found: CalibrationResult, system: System) -> None:
+    """Print the results of readings, how far to trust them, and which to use."""
+    from coupled.calibration.figures import basis, remarks
+    from coupled.cli.tables import print_table
+    from coupled.tables.calibration import results_table
+
+    out.print(basis(found), highlight=False)
+    out.print()
+    print_table(out, results_table(found, system))
+    out.print()
+    for line in remarks(found, system):
+        out.print(line, highlight=False, markup=False)
+
+
+def _print_plan(plan: ReadingsPlan, system: System) -> None:
+    """Print how precise K gets by grids of readings, and the fewest that reach what is wanted."""
+    from coupled.cli.tables import print_table
+    from coupled.display import percent
+    from coupled.tables.calibration import grids_table, plan_table
+
+    count, half = plan.reached.readings, plan.reached.half_width
+    print_table(out, grids_table(plan, system))
+    out.print(f"\nfewest for ± {percent(half)}: {count} readings", highlight=False)
+    print_table(out, plan_table(plan, system))
+    out.print(
+        "\nThe softest gradient far out gives S1, the stiffest at full force K. A few readings"
+        " between them show whether the bend is straight, which the ends alone cannot."
+    )
+    out.print(_deflection_line(plan.needs, count), highlight=False)
+
+
+def _deflection_line(needs: DeflectionNeeds, readings: int) -> str:
+    """Return what the readings give of the deflection, and what it takes to have it right."""
+    wanted = f"{100 * needs.wanted:g} %"
+    text = "Compensated with these, the aircraft gets the deflection to"
+    text += f" {100 * needs.half_width:.2g} % (95 %)."
+    if needs.half_width <= needs.wanted:
+        return text
+    ways = []
+    if needs.readings is not None:
+        ways.append(f"{needs.readings} readings")
+    if needs.ruler is not None:
+        ways.append(f"these {readings} with a ruler {needs.ruler:.2g} times finer")
+    elif needs.all is not None:
+        better = f"{needs.all:.2g} times better"
+        ways.append(f"these {readings} with every instrument and the hand {better}")
+    return f"{text} For {wanted} it takes {', or '.join(ways) or 'more than readings give'}."

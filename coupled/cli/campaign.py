@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+from rich.markup import escape
 
 from coupled.cli.app import (
     JsonOption,
@@ -16,7 +17,7 @@ from coupled.cli.app import (
     app,
     check_cluster,
 )
-from coupled.cli.process import asked_to_stop
+from coupled.cli.process import was_interrupted
 from coupled.cli.progress import progress
 from coupled.cli.reporting import ReportOption, check_report, say_report, write_report
 from coupled.cli.rigs import say_guesses
@@ -27,6 +28,8 @@ from coupled.outputs import Outputs
 from coupled.resources import find, shipped_sweeps
 
 if TYPE_CHECKING:
+    import polars as pl
+
     from coupled.campaign.sweep import SweepResult
     from coupled.display import System
     from coupled.plots.layout import Layout
@@ -43,12 +46,13 @@ def check(
     report: ReportOption = None,
     units: UnitsOption = "si",
 ) -> None:
-    """Fly runs and hold them against their expectations; exit code 1 if any fails."""
+    """Fly runs and evaluate their expectations; exit code 1 if any fails."""
     from coupled.campaign.check import check as check_runs
     from coupled.campaign.check import read_expecting
     from coupled.campaign.junit import junit_xml
-    from coupled.cli.tables.campaign import print_verdicts
+    from coupled.cli.tables import print_table
     from coupled.flight.manifest import input_files
+    from coupled.tables.campaign import verdict_tables
 
     found = [read_expecting(name) for name in run]
     names = [scenarios[0].name for scenarios in found]
@@ -63,7 +67,7 @@ def check(
     notes = [say_guesses(rig) for rig in {s.rig.name: s.rig for s, *_ in found}.values()]
     with progress() as advance:
         checked = check_runs(found, advance)
-    if asked_to_stop():  # what was flown of the last run says nothing of it
+    if was_interrupted():  # the last run is incomplete
         raise KeyboardInterrupt
     table = [verdict.as_dict() for verdict in checked.verdicts]
     with Outputs() as outputs:
@@ -76,7 +80,11 @@ def check(
             note = " ".join(dict.fromkeys(filter(None, notes)))
             write_report(report, outputs, inputs, lambda made: reported(checked, made, units), note)
     if json_file != "-":
-        print_verdicts(out, checked.verdicts, units)
+        for shown in verdict_tables(checked.verdicts, units):
+            print_table(out, shown)
+            out.print()
+        held = sum(verdict.passed for verdict in checked.verdicts)
+        out.print(f"{held} of {checked.total} expectations hold", highlight=False)
         if junit is not None:
             say(f"JUnit XML: {junit}")
         say_report(report)
@@ -114,7 +122,7 @@ def sweep(
     overlay: OverlayOption = False,
     size: SizeOption = "",
 ) -> None:
-    """Fly a run over values of its parameters, to one table; called again, it goes on."""
+    """Fly a run over values of its parameters, to one table; the same command resumes it."""
     from coupled.campaign.journal import JOURNAL
     from coupled.campaign.plan import read_plan
     from coupled.campaign.sensitivity import INDICES
@@ -154,7 +162,7 @@ def sweep(
 
 
 def _say_found(found: int, flights: int) -> None:
-    """Say how many flights the folder has already."""
+    """Print how many flights the folder has already."""
     if found == flights:
         text = f"all {flights} flights are there already; none is flown again"
         err.print(text, highlight=False)
@@ -169,16 +177,17 @@ def _show(
     json_file: str,
     handed: tuple[Path | None, System],
 ) -> None:
-    """Draw and print a sweep's table, with its indices or boundaries where they are asked for.
+    """Draw and print a sweep's table, with indices or boundaries if requested.
 
     `figure` is the figure's file and layout, `handed` the report's file, if any, and the units.
     """
     (path, layout), (report, units) = figure, handed
     from coupled.campaign.sensitivity import INDICES, write_indices
     from coupled.campaign.sweep import TABLE
-    from coupled.cli.tables.campaign import print_indices, print_survival, print_sweep
+    from coupled.cli.tables import print_table
     from coupled.plots.results import draw_result
     from coupled.plots.saving import save
+    from coupled.tables.campaign import indices_table, spread_table, survival_table
 
     asked, table = found.plan.sweep, found.table
     rows = [index.as_dict() for index in found.indices] or table.to_dicts()
@@ -193,14 +202,25 @@ def _show(
             inputs = [found.plan.file, found.plan.run_file, *sorted(found.plan.files)]
             write_report(report, outputs, inputs, lambda made: sweep_report(found, made, units))
     if json_file != "-":
-        print_sweep(out, table, asked.keep, units)
+        print_table(out, spread_table(table, asked.keep, units), gap=1)
+        _say_ended(table)
         for sentence in found.remarks:
             out.print(sentence, markup=False, highlight=False)
-        print_survival(out, found.limits)
+        if found.limits:
+            print_table(out, survival_table(found.limits, found.numeric_keys[0]), gap=1)
         say(f"table: {target / TABLE}  ({len(table)} flights)")
         if found.indices:
-            print_indices(out, found.indices)
+            print_table(out, indices_table(found.indices), gap=1)
             say(f"indices: {target / INDICES}")
         say(f"figure: {path}")
         say_report(report)
     print_json(rows, json_file)
+
+
+def _say_ended(table: pl.DataFrame) -> None:
+    """Print how many flights ended early, and why the first of them did."""
+    ended = table.filter(table["ended_early"] != "")
+    if len(ended):
+        first = ended.row(0, named=True)
+        why = f"the first, flight {first['flight']}: {first['ended_early']}"
+        out.print(f"[yellow]{len(ended)} of {len(table)} ended early[/]; {escape(why)}")

@@ -1,4 +1,4 @@
-"""The command of the force documentation: document."""
+"""The command `document`: force documentation and control checks."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def document(
 ) -> None:
     """Document a rig's forces: X-Y plots, figure 4, and 14 CFR Part 60 control checks.
 
-    A check that fails gives exit code 1, and the table says why.
+    A check that fails gives exit code 1, and the table has the reason.
     """
     from coupled.calibration.documentation import controls_of
     from coupled.calibration.forcedocument import document_rig
@@ -129,13 +129,19 @@ def document(
 
 
 def _print(documents: Sequence[Documentation], every: bool, judged: bool, units: System) -> None:
-    """Print each control's checks, and why some fail; `judged` is whether surfaces are."""
+    """Print each control's checks and reasons; `judged`: surfaces are checked too."""
     from coupled.calibration.reasons import reasons
-    from coupled.cli.tables.calibration import print_checks
+    from coupled.cli.tables import print_table
+    from coupled.tables.calibration import checks_table, narrowest
 
     for found in documents:
-        why = reasons(found.rig, found.control, found.checks, units)
-        print_checks(out, found.control, found.checks, every, why, units)
+        shown = found.checks if every else narrowest(found.checks)
+        print_table(out, checks_table(found.control, shown, units))
+        good = sum(check.passed for check in found.checks)
+        out.print(f"{found.control}: {good} of {len(found.checks)} checks pass", highlight=False)
+        for sentence in reasons(found.rig, found.control, found.checks, units):
+            out.print(f"  {sentence}", highlight=False)
+        out.print()
     if not judged:
         out.print("no aircraft: the surface's position is not judged\n")
 

@@ -1,22 +1,22 @@
-"""The command that takes a loader to JSBSim: export."""
+"""The command that takes a loader to other simulators: export."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.markup import escape
-from rich.table import Table
 
 from coupled.cli.app import JsonOption, app
 from coupled.cli.progress import progress
-from coupled.cli.tables.whole import print_whole
 from coupled.cli.terminal import check_json, err, give_json, out, say
 from coupled.errors import InputError, nearest
 from coupled.resources import find, shipped_rigs
 
 if TYPE_CHECKING:
+    from coupled.exporting.fmu.write import Fmu
     from coupled.exporting.write import Export
     from coupled.flight.manoeuvre import Manoeuvre
     from coupled.rig.rig import Rig
@@ -24,12 +24,20 @@ if TYPE_CHECKING:
 
 @app.command(
     epilog="[dim]Examples: coupled export t37 --jsbsim out/t37-jsbsim"
+    " · coupled export t37 --fmu out/t37-column.fmu --control column"
     " · coupled export my-rig.toml --jsbsim DIR --run my-run.toml"
     " · coupled export report-column --jsbsim DIR --run multiplier --case 'digital 20 Hz'[/]"
 )
 def export(
     rig: Annotated[str, typer.Argument(help="A rig file, or the name of a shipped one.")],
-    jsbsim: Annotated[Path, typer.Option(help="The folder to write: new, or a former export.")],
+    jsbsim: Annotated[
+        Path | None, typer.Option(help="The folder to write: new, or a former export.")
+    ] = None,
+    fmu: Annotated[Path | None, typer.Option(help="The FMU to write, for this platform.")] = None,
+    control: Annotated[str, typer.Option(help="The control of the FMU, of several.")] = "",
+    fmi: Annotated[
+        int, typer.Option(help="The version of FMI.", min=2, max=3, show_default=True)
+    ] = 3,
     run: Annotated[
         list[str] | None,
         typer.Option(help="A run to write scripts of; may be repeated. (default: the rig's)"),
@@ -45,15 +53,27 @@ def export(
     ] = False,
     json_file: JsonOption = "",
 ) -> None:
-    """Write a rig's loader as JSBSim systems, with the aircraft and scripts that JSBSim flies."""
+    """Write a rig's loader as JSBSim systems with aircraft and scripts, or as an FMU."""
     from coupled.exporting.folder import check_folder, exportable, write_export
+    from coupled.exporting.write import RATE_Hz
     from coupled.exporting.write import export as make
     from coupled.rig.rigfile import read_rig
 
     file = find(rig, shipped_rigs(), "rig")
+    if fmu is not None:
+        needless = {"--jsbsim": jsbsim, "--run": run and not case, "--no-check": no_check}
+        _refuse(rig, needless | {"--loader-rate-Hz": rate != RATE_Hz}, "leave it out with --fmu")
+        exported, _ = (
+            _select(read_rig(file), rig, run or [], case) if case else (read_rig(file), [])
+        )
+        _export_fmu(exported, fmu, control, fmi, file, json_file)
+        return
+    _refuse(rig, {"--control": control, "--fmi": fmi != 3}, "is for --fmu only")
+    if jsbsim is None:
+        raise InputError(rig, "--jsbsim", "is missing; give it, or --fmu")
     check_folder(jsbsim)
     check_json(json_file, [file])
-    exported, cases = _asked(read_rig(file), rig, run or [], case)
+    exported, cases = _select(read_rig(file), rig, run or [], case)
     flown, others = exportable(exported, cases)
     with progress() as advance:
         made = make(exported, flown, file, rate, not no_check, advance)
@@ -63,8 +83,37 @@ def export(
     give_json([one.as_dict() for one in made.beside], json_file)
 
 
-def _asked(rig: Rig, name: str, runs: list[str], case: str) -> tuple[Rig, list[Manoeuvre]]:
-    """Return the rig to export, and the cases whose scripts are asked for."""
+def _refuse(rig: str, given: Mapping[str, object], problem: str) -> None:
+    """Raise InputError for an option that is given and has no effect."""
+    for option, value in given.items():
+        if value:
+            raise InputError(rig, option, problem)
+
+
+def _export_fmu(rig: Rig, fmu: Path, control: str, fmi: int, file: Path, json_file: str) -> None:
+    from coupled.exporting.fmu.write import check_file, make_fmu, write_fmu
+
+    check_file(fmu)
+    check_json(json_file, [file, fmu])
+    made = make_fmu(rig, control, 2 if fmi == 2 else 3)
+    write_fmu(made, fmu)
+    if json_file != "-":
+        _say_fmu(made, fmu)
+    give_json(made.as_dict(), json_file)
+
+
+def _say_fmu(made: Fmu, file: Path) -> None:
+    for line in made.left:
+        err.print(f"[yellow]left out:[/] {escape(line)}", soft_wrap=True)
+    say(f"inputs: {', '.join(made.inputs)}")
+    say(f"outputs: {', '.join(made.outputs)}")
+    say(f"parameters: {len(made.parameters)}; all others are constant")
+    say(f"step: {made.frame_s:.9g} s, a frame, or a multiple")
+    say(f"FMU: {file}  (FMI {made.fmi}.0, co-simulation, for {made.platform} only)")
+
+
+def _select(rig: Rig, name: str, runs: list[str], case: str) -> tuple[Rig, list[Manoeuvre]]:
+    """Return the rig to export, and the cases of the scripts."""
     from coupled.exporting.folder import runs_of
     from coupled.flight.runfile import read_run
 
@@ -79,20 +128,11 @@ def _asked(rig: Rig, name: str, runs: list[str], case: str) -> tuple[Rig, list[M
 
 
 def _say(made: Export, folder: Path, others: list[str]) -> None:
+    from coupled.cli.tables import print_table
+    from coupled.tables.flights import export_table
+
     if made.beside:
-        table = Table(
-            "run", "case", "deflection", "force", "F_mod", "lost", box=None, pad_edge=False
-        )
-        for one in made.beside:
-            lost = "" if one.loss is None else f"{100.0 * one.loss:+.3f}"
-            table.add_row(
-                *(one.run, escape(f"{one.case}, {one.configuration}")),
-                *(f"{100.0 * x:.3f} %" for x in (one.deflection, one.force, one.modifying_force)),
-                lost,
-            )
-        out.print("by JSBSim alone, off coupled's own flight by (deflection of travel, forces of")
-        out.print("the greatest, the authority lost in points):")
-        print_whole(out, table)
+        print_table(out, export_table(made))
     for line in made.left:
         err.print(f"[yellow]left out:[/] {escape(line)}", soft_wrap=True)
     for line in made.scripted:

@@ -1,4 +1,4 @@
-"""The command that makes a nominal rig from records of a healthy machine: fit."""
+"""The command `fit`: fits a nominal rig to records of a healthy machine."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def fit(
     json_file: JsonOption = "",
     wide: WideOption = False,
 ) -> None:
-    """Fit a nominal rig to records of a healthy machine, and say what they do not determine."""
+    """Fit a nominal rig to records of a healthy machine, and list what they do not determine."""
     from coupled.gap.nominal import fit_nominal
     from coupled.rig.rigfile import read_rig
 
@@ -88,10 +88,12 @@ def _text(fitted: NominalFit, rig_file: Path, logs: list[Path]) -> str:
 
 
 def _print(fitted: NominalFit) -> None:
-    from coupled.cli.tables.fit import print_channels, print_numbers
+    from coupled.cli.tables import print_table
+    from coupled.tables.gaps import channels_table, numbers_table
 
-    print_numbers(out, fitted)
-    print_channels(out, fitted.channels)
+    print_table(out, numbers_table(fitted.numbers), edge=True)
+    out.print()
+    print_table(out, channels_table(fitted.channels), edge=True)
     for one in fitted.alike:
         say(f"not distinguished: {one.words}")
     for doubt in fitted.doubts:

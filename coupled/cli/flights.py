@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.table import Table
+from rich.markup import escape
+from rich.panel import Panel
 
 from coupled.cli.app import (
     JsonOption,
@@ -22,7 +24,6 @@ from coupled.cli.process import INTERRUPTED
 from coupled.cli.progress import progress
 from coupled.cli.reporting import ReportOption, check_report, say_report, write_report
 from coupled.cli.rigs import say_doubts, say_stale
-from coupled.cli.tables.whole import print_whole
 from coupled.cli.terminal import check_json, err, give_json, keep_json, out, print_json, say
 from coupled.errors import InputError, nearest, shown
 from coupled.files import check_target
@@ -32,6 +33,7 @@ from coupled.timing import timed
 
 if TYPE_CHECKING:
     from coupled.authority.compare import Flight
+    from coupled.display import System
     from coupled.flight.manoeuvre import Manoeuvre
 
 
@@ -56,7 +58,6 @@ def compare(
 ) -> None:
     """Fly a run rigid, uncompensated, with each correction, and with both."""
     from coupled.authority.compare import compare as compare_flights
-    from coupled.cli.tables.flights import print_comparison
     from coupled.flight.manifest import input_files
     from coupled.flight.runfile import read_run
 
@@ -80,7 +81,7 @@ def compare(
     with progress() as advance:
         flights = compare_flights(cases, advance)
     stopped = flights[-1].ended_early.startswith("interrupted")
-    no_figure = no_figure or stopped  # who has interrupted waits for no drawing
+    no_figure = no_figure or stopped  # no drawing after an interruption
     table = flights.as_dict()
     with timed("draw and write"), Outputs() as outputs:
         if not no_figure:
@@ -93,12 +94,34 @@ def compare(
                 report, outputs, inputs, lambda made: comparison_report(flights, made, units)
             )
     if json_file != "-":
-        print_comparison(out, flights, units)
+        _print(flights, units)
         if not no_figure:
             say(f"figure: {path}")
         say_report(report)
     print_json(table, json_file)
     _end(flights)
+
+
+def _print(flights: Sequence[Flight], system: System) -> None:
+    """Print a comparison: its card, a table for each case, remarks, and what ended early."""
+    from coupled.authority.figures import remarks, tabulated
+    from coupled.cli.tables import broken_heads, print_table
+    from coupled.tables.flights import comparison_table
+
+    run, groups = flights[0].manoeuvre, tabulated(flights)
+    width = min(92, out.width)
+    out.print(Panel(escape(" ".join(run.card.split())), title=escape(run.name), width=width))
+    for group in groups:
+        title = group[0].outcome.case if len(groups) > 1 else ""
+        table = replace(comparison_table(group, system), caption=title)
+        print_table(out, broken_heads(table), edge=True)
+        out.print()
+    for sentence in remarks(flights, system):
+        out.print(f"{escape(sentence)}\n", highlight=False)
+    for flight in flights:
+        o = flight.outcome
+        if o.ended_early:
+            out.print(f"{escape(o.case)}, {o.configuration}: ended early, {o.ended_early}")
 
 
 @app.command(epilog="[dim]Example: coupled fly pull-up-t37 --output out/t37.parquet[/]")
@@ -159,7 +182,7 @@ def fly(
 
 
 def _labelled(label: str, cases: Sequence[Manoeuvre], run: str) -> Manoeuvre:
-    """Return the case of a run with a label. Raises InputError where it has none."""
+    """Return the case of a run with a label. Raises InputError if there is none."""
     by_label = {each.label: each for each in cases}
     if label not in by_label:
         raise InputError(run, "--case", f"no case {label!r}; {nearest(label, by_label)}")
@@ -188,15 +211,14 @@ def plot(
 @app.command()
 def runs(json_file: JsonOption = "") -> None:
     """List the shipped runs and sweeps, what each shows, and the shipped rigs."""
+    from coupled.cli.tables import print_table
     from coupled.schema import load_toml
+    from coupled.tables.rigs import runs_table
 
     check_json(json_file, [])
     cards = {name: load_toml(path) for name, path in shipped_runs().items()}
     if json_file != "-":
-        table = Table("run", "rig", "what it shows", box=None, pad_edge=False)
-        for name, card in cards.items():
-            table.add_row(name, card["rig"], _sentence(card["card"]))
-        print_whole(out, table)
+        print_table(out, runs_table(cards))
         out.print("\nsweeps: " + ", ".join(shipped_sweeps()))
         out.print("rigs: " + ", ".join(shipped_rigs()))
     rows = [
@@ -205,13 +227,8 @@ def runs(json_file: JsonOption = "") -> None:
     give_json(rows, json_file)
 
 
-def _sentence(card: str) -> str:
-    """Return the first sentence of a card."""
-    return " ".join(card.split()).partition(". ")[0].rstrip(".") + "."
-
-
 def _end(flights: Sequence[Flight]) -> None:
-    """End a command by what ended its flights before their time, if anything did."""
+    """Exit with the reason if a flight ended early."""
     early = [flight.ended_early for flight in flights if flight.ended_early]
     if early:
         stopped = any(why.startswith("interrupted") for why in early)

@@ -1,4 +1,4 @@
-"""The command of the gap between a rig and its records: one, several, or a folder of them."""
+"""The command `diagnose`, for one record, several, or a folder of records."""
 
 from __future__ import annotations
 
@@ -157,25 +157,14 @@ def _print(
     whole: Diagnosis, power: bool, written: tuple[Path | None, list[Path]], units: System
 ) -> None:
     from coupled.calibration.assumed import outdated_bends
-    from coupled.cli.tables.gaps import (
-        in_words,
-        print_closed_loop,
-        print_effects,
-        print_in_flight,
-        print_power,
-        print_stages,
-    )
+    from coupled.cli.tables import print_table
+    from coupled.tables.gaps import diagnosis_tables
 
     improve, drawn = written
     out.print(in_words(whole, units), markup=False, highlight=False)
-    print_effects(out, whole.effects, whole.budget, units)
-    print_stages(out, whole.stages)
-    if whole.closed_loop is not None:
-        print_closed_loop(out, whole.closed_loop, units)
-    if whole.in_flight is not None:
-        print_in_flight(out, whole.in_flight, units)
-    if power:
-        print_power(out, whole.power, units)
+    for table in diagnosis_tables(whole, power, units):
+        out.print()
+        print_table(out, table, edge=True)
     if improve is not None:
         say(f"improved rig: {improve}")
         for sentence in outdated_bends(whole.nominal, whole.improved):
@@ -184,7 +173,20 @@ def _print(
         say(f"figure: {figure}")
 
 
-# Why a rig that is improved has a key that is no effect's number.
+def in_words(whole: Diagnosis, system: System) -> str:
+    """Return a diagnosis's summary; values for a rig file are in the file's unit.
+
+    For two or more effects it is a list of sentences.
+    """
+    from coupled.gap.findings.summary import sentences, summary_in
+
+    text = summary_in(whole.summary, whole.effects, system)
+    if len(whole.effects) < 2:
+        return text
+    return "\n".join(f"- {sentence}" for sentence in sentences(text))
+
+
+# Reasons of keys in an improved rig that are no effect's parameters.
 _GOES_WITH = "which goes with what was found; it has no effect of its own"
 _BESIDE = {
     "servo_damping_ratio": "since a file gives both numbers of a servo or none",
@@ -242,7 +244,7 @@ def _report(
     inputs: list[Path],
     handed: tuple[Diagnosis, bool, str, System],
 ) -> None:
-    """Write a diagnosis's report; `handed` is it, with power or without, a note, and units."""
+    """Write the report of a diagnosis; `handed` has it, its power or None, a note and units."""
     whole, power, note, units = handed
     if path is None:
         return
@@ -273,10 +275,11 @@ def _diagnose_folder(
     control: ControlName,
     place: tuple[int, str],
 ) -> None:
-    """Diagnose a control in every record of a folder, each alone; print and write a summary."""
-    from coupled.cli.tables.gaps import print_summary
+    """Diagnose a control in each record of a folder; print and write a summary."""
+    from coupled.cli.tables import print_table
     from coupled.gap.batch import LIST, jobs, run_all, summary
     from coupled.record.record import manifest_path
+    from coupled.tables.gaps import batch_table
 
     if len(folders) > 1:
         raise InputError(folders[1], "", "a folder of records is diagnosed by itself")
@@ -291,7 +294,7 @@ def _diagnose_folder(
     with progress() as advance:
         found = run_all(todo, advance, *place)
     write_text(output / "summary.csv", summary(found))
-    print_summary(out, found)
+    print_table(out, batch_table(found), edge=True)
     say(f"diagnoses: {output}  ({len(found)}, and summary.csv)")
     if all(row.why for row in found):
         say("no record could be diagnosed: summary.csv has the reason for each")

@@ -1,4 +1,4 @@
-"""What diagnose and fit share, which hold records against a rig: files, and how they are read."""
+"""Files of the commands `diagnose` and `fit`, which compare records with a rig."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ RECORDS = "CSV or Parquet"  # what a record's file is, for help texts
 
 
 def files_read(records: Sequence[Path], rig_file: Path | None) -> list[Path]:
-    """Return the files that are read: records, their manifests, the rig's if one is given."""
+    """Return the input files: records, their manifests, and the rig's if given."""
     from coupled.record.record import manifest_path
 
     own = [] if rig_file is None else [rig_file]
@@ -26,7 +26,7 @@ def files_read(records: Sequence[Path], rig_file: Path | None) -> list[Path]:
 def check_rig_target(
     path: Path | None, option: str, inputs: Sequence[Path], made: Path | None = None
 ) -> list[Path]:
-    """Refuse a rig file that could not be written; return it where asked for."""
+    """Raise InputError if a rig file cannot be written; return its path if requested."""
     if path is None:
         return []
     if path.suffix != ".toml":
@@ -36,7 +36,7 @@ def check_rig_target(
 
 
 def read_each(files: Sequence[Path]) -> dict[str, Record]:
-    """Return the records by their files' names; raise InputError for one given twice."""
+    """Return the records by file name; raise InputError for a record given twice."""
     from coupled.record.record import read_record
 
     read: dict[str, Record] = {}

@@ -1,4 +1,4 @@
-"""The command that flies live: the host of a loader, a hand, views and the page."""
+"""The command `live`: a flight in real time with a loader, a hand, views and the page."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from coupled.outputs import Outputs
 if TYPE_CHECKING:
     from coupled.flight.manoeuvre import Manoeuvre
     from coupled.live.dashboard.page import Page
-    from coupled.live.hands import Wishes
+    from coupled.live.hands import HandPositions
     from coupled.live.host import Watcher
     from coupled.live.recording import Recording
     from coupled.live.session import LiveFlight
@@ -95,7 +95,7 @@ def live(
 ) -> None:
     """Fly in real time, with a loader, a hand and views attached; q or Ctrl-C ends it.
 
-    The record has the format of `coupled fly`, whole up to the frame at which it ended. It grows
+    The record has the format of `coupled fly`, complete up to the last frame. It grows
     on disk while the flight goes on, so that a computer that fails leaves all but the last second.
     """
     from coupled.live.attach import open_link, rig_live, run_live
@@ -132,7 +132,7 @@ def live(
         plan = Plan(
             paced=not lockstep,
             link=open_link(loader, flown.rig, lockstep, not unmeasured),
-            wishes=_wishes(who, loader, axes, page),
+            hand_positions=_open_hand(who, loader, axes, page),
             limits=limits,
             adapt=adapt,
             watchers=watchers,
@@ -152,7 +152,7 @@ def live(
 
 
 class _Warner:
-    """Says a warning on the terminal, and on the page where there is one."""
+    """Prints a warning on the terminal, and on the page if there is one."""
 
     def __init__(self) -> None:
         self.page: Page | None = None
@@ -164,7 +164,7 @@ class _Warner:
 
 
 def _check_targets(flown: Manoeuvre, path: Path, json_file: str) -> None:
-    """Refuse files that could not be written, before the flight that they are to hold."""
+    """Raise InputError before the flight if its files cannot be written."""
     from coupled.live.recording import recording_path
     from coupled.record.record import check_suffix, manifest_path
 
@@ -177,7 +177,7 @@ def _check_targets(flown: Manoeuvre, path: Path, json_file: str) -> None:
 
 
 def _write(flight: LiveFlight, path: Path, json_file: str, recording: Recording) -> None:
-    """Write the whole record in place of the one that grew while it was flown."""
+    """Write the complete record in place of the file that grew in flight."""
     from coupled.record.record import write_record
 
     if len(flight.record) < 2:
@@ -193,16 +193,16 @@ def _write(flight: LiveFlight, path: Path, json_file: str, recording: Recording)
 
 
 def _so_far(path: Path) -> Path:
-    """Return where a record is written while the flight goes on."""
+    """Return the file of the record that grows in flight."""
     return path.with_name(f"{path.stem}-so-far{path.suffix}")
 
 
 def _page(flown: Manoeuvre, address: str, port: int, ending: ExitStack) -> Page:
-    """Open the page, and print where it is."""
-    from coupled.live.attach import needs
+    """Open the page, and print its address."""
+    from coupled.live.attach import check_installed
 
     for package in ("starlette", "uvicorn", "websockets"):
-        needs(package, "--dashboard")
+        check_installed(package, "--dashboard")
     from coupled.live.dashboard.page import Page
 
     page = Page([str(name) for name in flown.rig.controls], address, port)
@@ -211,14 +211,14 @@ def _page(flown: Manoeuvre, address: str, port: int, ending: ExitStack) -> Page:
     return page
 
 
-def _wishes(who: str, loader: str, axes: str, page: Page | None) -> Wishes | None:
-    """Return what moves the hands of a simulated loader; None for a run's pilots."""
+def _open_hand(who: str, loader: str, axes: str, page: Page | None) -> HandPositions | None:
+    """Return the source of hand positions for a simulated loader; None for a run's pilots."""
     if loader != "sim" or who == "pilot":
         return None
     if who == "stick":
-        from coupled.live.attach import needs
+        from coupled.live.attach import check_installed
 
-        needs("pygame", "--hand stick")
+        check_installed("pygame", "--hand stick")
         from coupled.live.stick import Stick
 
         return Stick(axes)
@@ -226,7 +226,7 @@ def _wishes(who: str, loader: str, axes: str, page: Page | None) -> Wishes | Non
 
 
 def _finish(page: Page, flight: LiveFlight, path: Path, stays: bool) -> None:
-    """Show on the page what was flown, held against its rig; until it is left, where it `stays`."""
+    """Show record and diagnosis on the page; if it `stays`, until the user closes it."""
     from coupled.live.verdict import diagnosed
 
     page.finish(phase="diagnosing", record=str(path))
@@ -251,7 +251,7 @@ def _inputs(flown: Manoeuvre) -> list[Path]:
 
 
 def _views(in_flightgear: str, in_xplane: str) -> list[Watcher]:
-    """Return the views asked for, and print the line that starts FlightGear."""
+    """Return the requested views, and print the command that starts FlightGear."""
     from coupled.live.flightgear import flightgear, start_line
     from coupled.live.link import split_place
     from coupled.live.xplane import xplane

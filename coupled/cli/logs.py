@@ -1,4 +1,4 @@
-"""The command that takes in a user's own log: import."""
+"""The command `import`: converts a user's log to a record."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+from rich.markup import escape
 
 from coupled.cli.app import JsonOption, app
 from coupled.cli.terminal import check_json, keep_json, out, print_json, say
@@ -15,7 +16,11 @@ from coupled.outputs import Outputs
 from coupled.resources import find, shipped_rigs
 
 if TYPE_CHECKING:
+    from coupled.record.importing.account import ClockAccount, ImportAccount
+    from coupled.record.importing.suggest.propose import Proposal
     from coupled.rig.rig import Rig
+
+_LISTED = 12  # unmapped columns named on the terminal; the manifest has all
 
 
 @app.command(
@@ -60,7 +65,7 @@ def import_log(
     ] = "",
     json_file: JsonOption = "",
 ) -> None:
-    """Make a record of your own log, and say whether each channel is plausible."""
+    """Convert your own log to a record, and report whether each channel is plausible."""
     if map_file is not None and suggest is not None:
         problem = "give a map, or --suggest to have one proposed: one of the two"
         raise InputError("coupled import", "--map", problem)
@@ -88,7 +93,6 @@ def _convert(
     inputs: list[Path],
     json_file: str,
 ) -> None:
-    from coupled.cli.tables.logs import print_account
     from coupled.record.importing.convert import import_log as import_file
     from coupled.record.importing.heads import known_map
     from coupled.record.record import check_suffix, manifest_path, write_record
@@ -108,7 +112,7 @@ def _convert(
     if json_file != "-":
         if program:
             say(f"map: {program}'s own, by the log's head")
-        print_account(out, account)
+        _print_account(account)
         say(f"record: {path}  ({len(record)} rows, {len(record.channels)} channels)")
         say(f"manifest: {manifest_path(path)}")
     print_json(table, json_file)
@@ -117,7 +121,6 @@ def _convert(
 def _suggest(
     logs: list[Path], target: Path, rig_file: Path | None, inputs: list[Path], json_file: str
 ) -> None:
-    from coupled.cli.tables.logs import print_proposal
     from coupled.record.importing.suggest.propose import propose
 
     if target.suffix != ".toml":
@@ -130,6 +133,47 @@ def _suggest(
         outputs.at(target).write_text(proposal.text, encoding="utf-8")
         keep_json(table, json_file, outputs)
     if json_file != "-":
-        print_proposal(out, proposal)
+        _print_proposal(proposal)
         say(f"map: {target}")
     print_json(table, json_file)
+
+
+def _print_account(account: ImportAccount) -> None:
+    """Print how the clock was read, a row for each channel, and what was left out."""
+    from coupled.cli.tables import print_table
+    from coupled.tables.logs import account_table
+
+    out.print(_clock_in_words(account.clock), highlight=False)
+    print_table(out, account_table(account))
+    for warning in account.warnings:
+        out.print(f"[yellow]{escape(warning)}[/]", highlight=False)
+    left = account.unmapped
+    if left:
+        more = f" and {len(left) - _LISTED} more" if len(left) > _LISTED else ""
+        out.print(f"not mapped: {escape(', '.join(left[:_LISTED]))}{more}", highlight=False)
+
+
+def _print_proposal(proposal: Proposal) -> None:
+    """Print which column a proposed map takes for which channel, and what it asks."""
+    from coupled.cli.tables import print_table
+    from coupled.tables.logs import proposal_table
+
+    print_table(out, proposal_table(proposal))
+    for question in proposal.questions:
+        out.print(f"[yellow]to answer:[/] {escape(question)}", highlight=False)
+    for warning in proposal.warnings[:_LISTED]:
+        out.print(f"[yellow]{escape(warning)}[/]", highlight=False)
+    if proposal.unmapped:
+        out.print(f"not used: {escape(', '.join(proposal.unmapped[:_LISTED]))}", highlight=False)
+
+
+def _clock_in_words(clock: ClockAccount) -> str:
+    """Return how the rows of the log became frames of the record."""
+    rows = f"{clock.rows_used} of {clock.log_rows} rows at {clock.log_rate_Hz:.4g} Hz"
+    if clock.method == "pchip":
+        steps = f"{1e3 * clock.least_step_s:.3g} to {1e3 * clock.greatest_step_s:.3g} ms"
+        how = f"{steps} apart, interpolated (PCHIP)"
+    else:
+        how = "even, taken as they are"
+    frames = f"{clock.frames} frames at {clock.frame_rate_Hz:g} Hz"
+    return f"clock: {rows}, {how};\n       {frames}"

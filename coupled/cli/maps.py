@@ -1,4 +1,4 @@
-"""The command of the authority maps: map."""
+"""The command `map`: authority maps and stick forces."""
 
 from __future__ import annotations
 
@@ -36,7 +36,6 @@ def draw_map(
 ) -> None:
     """Map what a rig loses over q̄ and deflection, and its stick force per g and per knot."""
     from coupled.authority.whole import map_rig
-    from coupled.cli.tables.maps import write_feel
     from coupled.plots.maps import draw_feel, draw_losses
     from coupled.plots.saving import check_format, save
     from coupled.record.csvfile import write_table
@@ -66,7 +65,7 @@ def draw_map(
         write_table(found.to_polars(), outputs.at(written[1]))
         if felt is not None:
             save(draw_feel(data.name, felt, units), outputs.at(written[2]), note)
-            write_feel(felt, outputs.at(written[3]))
+            write_table(felt.to_polars(), outputs.at(written[3]))
     if felt is None:
         say("no level trim of a column: no stick force per g or per knot")
         written = written[:2]

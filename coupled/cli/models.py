@@ -1,4 +1,4 @@
-"""The commands about JSBSim's models: models, new rig."""
+"""The commands `models` and `new rig`: JSBSim's models, and first rigs for them."""
 
 from __future__ import annotations
 
@@ -8,14 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.markup import escape
-from rich.table import Table
 
 from coupled.cli.app import JsonOption, UnitsOption, app
 from coupled.cli.new import check_new, new, write_new
 from coupled.cli.progress import progress
 from coupled.cli.rigs import ControlOption
-from coupled.cli.tables.whole import print_whole
 from coupled.cli.terminal import check_json, give_json, out, say
 from coupled.display import System, in_system
 from coupled.errors import InputError, shown
@@ -24,6 +21,7 @@ from coupled.record.channels import TIME, ControlName, control_named
 
 if TYPE_CHECKING:
     from coupled.record.record import Record
+    from coupled.rig.parameters import Flight
     from coupled.surveying.fromlog import LogNumbers
     from coupled.surveying.survey import Surveyed
 
@@ -58,18 +56,47 @@ def models(
     give_json(found.as_dict(), json_file)
 
 
+@app.command(epilog="[dim]Examples: coupled terms c172p · coupled terms T37 --run pull-up-t37[/]")
+def terms(
+    model: Annotated[
+        str,
+        typer.Argument(help="A JSBSim model that is here, or the folder or file of another."),
+    ],
+    run: Annotated[
+        str,
+        typer.Option(
+            help="The run whose first case is flown. (default: a doublet and a 3-2-1-1 on each"
+            " surface)"
+        ),
+    ] = "",
+    json_file: JsonOption = "",
+) -> None:
+    """List the named functions of a model's aerodynamics, with axis and share of it in a flight.
+
+    A rig scales them by name in [flight.terms].
+    """
+    from coupled.cli.tables import print_table
+    from coupled.surveying.terms import list_terms
+    from coupled.tables.rigs import terms_table
+
+    check_json(json_file, [])
+    with progress() as advance:
+        found = list_terms(model, run or None, advance)
+    if json_file != "-":
+        print_table(out, terms_table(found))
+        say(f"shares in {found.flown}, {_place(found.flight)}")
+    give_json(found.as_dict(), json_file)
+
+
+def _place(flight: Flight) -> str:
+    return f"from {flight.calibrated_airspeed:g} m/s, {flight.altitude:g} m"
+
+
 def _print(rows: Sequence[Surveyed]) -> None:
-    table = Table("model", "trims at", "controls", "rigs", box=None, pad_edge=False)
-    for row in rows:
-        where, controls = f"[yellow]no:[/] {escape(row.why)}", ""
-        if row.flight is not None:
-            speed, height = row.flight.calibrated_airspeed, row.flight.altitude
-            held = "" if row.holds else ", does not hold"
-            where = f"{speed:g} m/s, {height:g} m{held}"
-            controls = ", ".join(row.controls) or "none"
-            controls += "" if row.direct or not row.controls else " (by a law or lag)"
-        table.add_row(row.model, where, controls, ", ".join(row.rigs))
-    print_whole(out, table)
+    from coupled.cli.tables import print_table
+    from coupled.tables.rigs import models_table
+
+    print_table(out, models_table(rows))
     trimmed = [row for row in rows if row.flight is not None]
     led = [row for row in trimmed if row.controls]
     out.print(f"\n{len(trimmed)} of {len(rows)} trim, {len(led)} can be flown by a rig")
@@ -79,6 +106,7 @@ def _print(rows: Sequence[Surveyed]) -> None:
     epilog="[dim]Examples:\n\n"
     "coupled new rig DHC6\n\n"
     "coupled new rig path/to/mymodel my-rig.toml\n\n"
+    "coupled new rig DHC6 airframe.toml --airframe-only\n\n"
     "coupled new rig --bench yoke.toml\n\n"
     "coupled new rig --bench yoke.toml --set travel=4in --set gradient=12lbf/in --set servo=no\n\n"
     "coupled new rig --from log.csv yoke.toml --units us[/]"
@@ -116,6 +144,9 @@ def rig(
         ),
     ] = None,
     control: ControlOption = "column",
+    airframe_only: Annotated[
+        bool, typer.Option("--airframe-only", help="The aircraft alone, without a control.")
+    ] = False,
     units: UnitsOption = "si",
 ) -> None:
     """Write a first rig: for a JSBSim model, or of a control on the bench. Guesses are listed."""
@@ -123,6 +154,8 @@ def rig(
         if file is not None:
             problem = "give the new rig's file alone: a bench has no model"
             raise InputError("new rig", str(file), problem)
+        if airframe_only:
+            raise InputError("new rig", "--airframe-only", "a bench has no aircraft")
         path = Path(model or "my-rig.toml")
         _bench(path, (log, map_file), given or [], control_named(control, "new rig"), units)
         return
@@ -132,7 +165,7 @@ def rig(
         used = "--set" if given else "--map" if map_file else "--control"
         used = "--units" if units != "si" and used == "--control" and control == "column" else used
         raise InputError("new rig", used, "goes with --bench or --from")
-    _for_model(model, file)
+    _for_model(model, file, airframe_only)
 
 
 def _bench(
@@ -142,7 +175,7 @@ def _bench(
     control: ControlName,
     units: System,
 ) -> None:
-    """Write a rig without an aircraft; at a terminal, ask for what is not given."""
+    """Write a rig without an aircraft; on a terminal, prompt for numbers not given."""
     from coupled.rig.rigfile import rig_from_table
     from coupled.schema import loads_toml
     from coupled.surveying.benchrig import answer, bench_rig, questions, split_answers, yes
@@ -163,7 +196,7 @@ def _bench(
     if log is None and sys.stdin is not None and sys.stdin.isatty():
         if "servo" not in answers:
             servo = typer.confirm("a servo or motor moves the control?", default=False)
-        numbers = _asked(control, numbers, servo, units)
+        numbers = _prompt_for_numbers(control, numbers, servo, units)
     text = bench_rig(path.stem, control, numbers, servo, found, shown(log.name) if log else "")
     rig_from_table(loads_toml(text, path), path)  # a rig that cannot be flown is refused
     write_new(path, text, ".toml", f"coupled new run --rig {path}")
@@ -188,10 +221,10 @@ def _logged(log: Path, map_file: Path | None) -> Record:
         raise InputError(log, error.key, problem) from None
 
 
-def _asked(
+def _prompt_for_numbers(
     control: ControlName, known: dict[str, float], servo: bool, units: System
 ) -> dict[str, float]:
-    """Return the numbers known and those that a person answers; an empty answer is a guess."""
+    """Return the known numbers and the answers to prompts; an empty answer is a guess."""
     from coupled.surveying.benchrig import answer, guesses, questions
 
     found = dict(known)
@@ -214,36 +247,27 @@ def _asked(
 
 
 def _print_found(found: LogNumbers, control: ControlName, units: System) -> None:
-    """Print what a log gives of a control, and how sure it is."""
+    """Print the numbers of a control found in a log, with their errors."""
+    from coupled.cli.tables import print_table
     from coupled.surveying.benchrig import found_in, questions
+    from coupled.tables.rigs import logged_table
 
-    numbers, sure = found_in(found)
-    table = Table("of the log", "value", "", box=None, pad_edge=False)
-    for name, value in numbers.items():
-        question = questions(control)[name]
-        unit = in_system(question.unit, units)
-        words = "determined" if name in sure else "the log does not determine it: a guess"
-        if name == "travel":
-            words = "the greatest in the log: a guess"
-        table.add_row(question.words, f"{unit.written(value)} {unit.unit}", words)
-    print_whole(out, table)
+    print_table(out, logged_table(*found_in(found), questions(control), units))
 
 
-def _for_model(model: str, file: Path | None) -> None:
+def _for_model(model: str, file: Path | None, airframe_only: bool) -> None:
     """Write a first rig for a JSBSim model: where it trims, found; its loader, guessed."""
     from coupled.surveying.draft import draft
-    from coupled.surveying.survey import chosen_model, survey
+    from coupled.surveying.survey import chosen_model, surveyed
 
     chosen = chosen_model(model)
     path = file or Path(f"{chosen.file or chosen.model}.toml")
     check_new(path, ".toml")
     with progress() as advance:
         advance(f"where {chosen.label} trims", 0, 1)
-        found = survey(chosen, speeds=True)
-    if found.flight is None:
-        raise InputError(model, "", f"does not trim wherever it was tried: {found.why}")
-    if not found.controls:
-        raise InputError(model, "", f"has no control that a rig could move: {found.lacking[0]}")
+        found = surveyed(model, chosen, airframe_only)
     folder = path_from(path.parent, chosen.home) if chosen.own else ""
-    text = draft(found, path.stem, folder)
-    write_new(path, text, ".toml", f"coupled new run --rig {path}, and coupled compare")
+    text = draft(found, path.stem, folder, airframe_only)
+    then = f"coupled new run --rig {path}, and coupled compare"
+    then = f"coupled terms {model}" if airframe_only else then
+    write_new(path, text, ".toml", then)

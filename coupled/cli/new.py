@@ -1,4 +1,4 @@
-"""The commands that write commented starters: new run, sweep, map, readings."""
+"""The commands `new run`, `sweep`, `map` and `readings`: commented templates."""
 
 from __future__ import annotations
 
@@ -74,8 +74,8 @@ def readings(
 ) -> None:
     """Write a form for a loader's readings, each row with what to do.
 
-    coupled calibrate --plan --write FILE makes one for a rig of your own, with the places where
-    its readings tell most.
+    coupled calibrate --plan --write FILE makes one for a rig of your own, with the most informative
+    readings.
     """
     from coupled.calibration.form import starting_form
 
@@ -87,7 +87,7 @@ def readings(
 
 
 def _run_for(rig: str, control: str, file: Path) -> str:
-    """Return the text of a run of a rig's own, after its cases have been flown."""
+    """Return the text of a run for a rig, after a flight of its cases."""
     from coupled.authority.firstrun import first_run
 
     rig_file, data, name = rig_and_control(rig, control)
@@ -107,7 +107,7 @@ def check_new(file: Path, suffix: str) -> None:
 
 
 def write_new(file: Path, text: str, suffix: str, then: str) -> None:
-    """Write a starter where no file is yet, and say what to do with it next.
+    """Write a template as a new file, and print the next command.
 
     Raises InputError for another ending than `suffix`, and where a file is there already.
     """

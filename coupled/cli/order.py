@@ -1,4 +1,4 @@
-"""The commands in the order in which a user meets them, under the heads of `coupled --help`."""
+"""The order and headings of the commands in `coupled --help`."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ PANELS = {
     "Fly": ("runs", "compare", "fly", "check", "sweep", "plot", "live"),
     "Your loader": ("bench", "calibrate", "document", "map", "stability"),
     "Simulation and record": ("import", "diagnose", "fit", "blind"),
-    "Your aircraft": ("models", "new", "export"),
+    "Your aircraft": ("models", "terms", "new", "export"),
 }
 
 
 def name_of(info: Any) -> str:
-    """Return what a user types for a command or a group of typer's."""
+    """Return the name of a typer command or group."""
     return str(info.name or info.callback.__name__.replace("_", "-"))
 
 
 def arrange(app: typer.Typer) -> None:
-    """Put each command under its head, and in its place there."""
+    """Set heading and order of each command."""
     place = {name: head for head, names in PANELS.items() for name in names}
     order = {name: i for i, name in enumerate(place)}
     registered: list[Any] = [*app.registered_commands, *app.registered_groups]

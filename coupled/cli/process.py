@@ -1,4 +1,4 @@
-"""What a command owes the system that runs it: its streams, its signals, its exit code."""
+"""Streams, signals and exit code of a command's process."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ from types import FrameType
 from coupled.errors import say_warning
 
 REFUSED = 2  # input that cannot be used
-INTERRUPTED = 130  # as a shell tells of Ctrl-C: 128 and the number of SIGINT
-PIPE_CLOSED = 141  # likewise of SIGPIPE: whoever read the output has gone
+INTERRUPTED = 130  # as in a shell after Ctrl-C: 128 plus the number of SIGINT
+PIPE_CLOSED = 141  # likewise of SIGPIPE: the output's pipe was closed
 _STREAM_FAULTS = (errno.ENOSPC, errno.EIO, errno.EBADF, errno.EFBIG, errno.EDQUOT)
 
 
 class Stop:
-    """Let SIGTERM and a hang-up end a command as Ctrl-C does: finished work is kept.
+    """Makes SIGTERM and SIGHUP end a command as Ctrl-C does: finished work is kept.
 
-    `exit_code` is that of the signal that came, or 0; `asked` tells whether any came, Ctrl-C
-    too, since a library may swallow the exception.
+    `exit_code` is that of the signal received, or 0; `received` is true after any signal, Ctrl-C
+    included, since a library may swallow the exception.
     """
 
     def __init__(self) -> None:
-        self.exit_code, self.asked = 0, False
+        self.exit_code, self.received = 0, False
         wanted = [getattr(signal, name, None) for name in ("SIGTERM", "SIGHUP")]
-        # One that is ignored, as by nohup, stays so.
+        # A signal that is ignored, as by nohup, stays ignored.
         self._signals = [n for n in wanted if n and signal.getsignal(n) == signal.SIG_DFL]
 
     def __enter__(self) -> Stop:
@@ -46,16 +46,16 @@ class Stop:
         signal.signal(signal.SIGINT, self._before)
 
     def _come(self, number: int, frame: FrameType | None) -> None:
-        self.asked = True
-        if number != signal.SIGINT:  # the command itself says how it ends after that
+        self.received = True
+        if number != signal.SIGINT:  # the command itself decides how it then ends
             self.exit_code = 128 + number
         raise KeyboardInterrupt
 
 
-def asked_to_stop() -> bool:
-    """Tell whether an interruption has come while a `Stop` was on."""
+def was_interrupted() -> bool:
+    """Return whether a signal was received within a `Stop`."""
     stop = getattr(signal.getsignal(signal.SIGINT), "__self__", None)
-    return isinstance(stop, Stop) and stop.asked
+    return isinstance(stop, Stop) and stop.received
 
 
 def prepare_streams() -> None:
@@ -76,7 +76,7 @@ def prepare_streams() -> None:
 
 
 def prepare_threads() -> None:
-    """Let linear algebra use one thread, unless the user says otherwise.
+    """Let linear algebra use one thread, unless the user sets another number.
 
     The matrices here are small, and its threads would wait for one another longer than they work;
     what takes long is dealt to processes. Only before numpy is loaded has this an effect.
@@ -86,12 +86,12 @@ def prepare_threads() -> None:
 
 
 def prepare_warnings() -> None:
-    """Let a warning of a library be one line for a user, not a place in its code."""
+    """Print warnings of libraries as one line, without the place in their code."""
     warnings.showwarning = say_warning
 
 
 def silence_streams() -> None:
-    """Drop what waits on a stream that takes no more."""
+    """Discard buffered output of a closed stream."""
     for stream in (sys.stdout, sys.stderr):
         if stream is None:
             continue
@@ -104,8 +104,8 @@ def silence_streams() -> None:
                 os.close(nowhere)
 
 
-def said_of(error: OSError | MemoryError) -> str:
-    """Return the line for a fault of the system that no reader or writer has named."""
+def error_text(error: OSError | MemoryError) -> str:
+    """Return the message for an OSError that no reader or writer has handled."""
     if isinstance(error, MemoryError):
         return "out of memory: shorter records, or fewer workers, need less"
     why = error.strerror or str(error)

@@ -1,4 +1,4 @@
-"""Progress of long work: a bar on a terminal, a line every ten seconds elsewhere."""
+"""Progress of long work: a bar on a terminal, otherwise a line every ten seconds."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from contextlib import contextmanager
 
 from rich.markup import escape
 
-from coupled.cli.process import asked_to_stop
+from coupled.cli.process import was_interrupted
 from coupled.cli.terminal import err
 
 Advance = Callable[[str, int, int], None]
-EVERY_s = 10.0  # between the lines where there is no terminal
-MARK = "…"  # before each of them, so that a reader of a log can leave them out
+EVERY_s = 10.0  # between the lines without a terminal
+MARK = "…"  # before each line, so that a log can be filtered
 
 
 @contextmanager
@@ -27,7 +27,7 @@ def progress(first: str = "") -> Iterator[Advance]:
     with _bar(first or _starting()) if err.is_terminal else _lines(first) as show:
 
         def advance(label: str, done: int, total: int) -> None:
-            if asked_to_stop():  # a library may swallow it, and the work go on
+            if was_interrupted():  # a library may swallow it, and the work continue
                 raise KeyboardInterrupt
             show(label, done, total)
 
@@ -50,7 +50,7 @@ def _bar(first: str) -> Iterator[Advance]:
 
 @contextmanager
 def _lines(first: str) -> Iterator[Advance]:
-    """Print a line every so often from a thread, whether the work reports anything or not."""
+    """Print a line at intervals from a thread, even if the work reports nothing."""
     began, over = time.monotonic(), threading.Event()
     latest: list[tuple[str, int, int]] = [(first, 0, 0)]
 
@@ -75,7 +75,7 @@ def _lines(first: str) -> Iterator[Advance]:
 
 
 def _starting() -> str:
-    """Return what is said while a command loads; compiling takes longer than all the rest."""
+    """Return the text shown while a command loads; compilation takes most of this time."""
     from coupled.rig.compiled import compiled_before
     from coupled.rig.placed import step_frame_at
 

@@ -1,4 +1,4 @@
-"""The option that hands a command's result on: one HTML file."""
+"""The option `--report`: a command's result as one HTML file."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ ReportOption = Annotated[
 
 
 def check_report(path: Path | None, others: Iterable[Path], made: Path | None = None) -> list[Path]:
-    """Refuse a report that could not be written, or is another file; return it where asked for.
+    """Raise InputError if a report cannot be written or is another file; return its path or None.
 
     `made` is a folder that the command makes.
     """
@@ -65,6 +65,6 @@ def write_report(
 
 
 def say_report(path: Path | None) -> None:
-    """Say where the report is, where one was asked for."""
+    """Print the path of the report, if requested."""
     if path is not None:
         say(f"report: {path}")

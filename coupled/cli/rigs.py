@@ -1,4 +1,4 @@
-"""What the bench's commands share: a rig, its control, and the instruments' errors."""
+"""Shared by the bench's commands: a rig, its control, and the instruments' errors."""
 
 from __future__ import annotations
 
@@ -53,11 +53,12 @@ OnceOption = Annotated[
 
 
 def rig_and_control(name: str, control: str) -> tuple[Path, Rig, ControlName]:
-    """Return a rig's file, the rig, and the control that is meant."""
+    """Return a rig's file, the rig, and the selected control."""
     from coupled.rig.rigfile import read_rig
 
     file = find(name, shipped_rigs(), "rig")
     rig = read_rig(file)
+    rig.check_controlled(file)
     for known in CONTROL_NAMES:
         if known == control and known in rig.controls:
             return file, rig, known
@@ -65,13 +66,13 @@ def rig_and_control(name: str, control: str) -> tuple[Path, Rig, ControlName]:
 
 
 def say_doubts(rig: Rig) -> str:
-    """Say what has changed since a rig's calibrations, and what `say_guesses` does."""
+    """Call `say_stale` and `say_guesses`."""
     say_stale(rig)
     return say_guesses(rig)
 
 
 def say_guesses(rig: Rig, controls: Collection[str] = ()) -> str:
-    """Say on the terminal's error side which numbers of a rig are guesses.
+    """Print on standard error which numbers of a rig are guesses.
 
     Return the sentence, for figures and reports.
     """
@@ -84,7 +85,7 @@ def say_guesses(rig: Rig, controls: Collection[str] = ()) -> str:
 
 
 def say_stale(rig: Rig) -> None:
-    """Say on the terminal's error side what has changed since a rig's calibrations."""
+    """Print on standard error what has changed since a rig's calibrations."""
     from coupled.calibration.assumed import stale
 
     for name, control in rig.controls.items():

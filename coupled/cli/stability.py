@@ -1,4 +1,4 @@
-"""The command of a rig's stability: stability."""
+"""The command `stability`: maps and limits of a rig's stability."""
 
 from __future__ import annotations
 
@@ -39,16 +39,17 @@ def stability(
     Against the host's K̂, the frame of a digital product, the hand, the servo and the gauge.
     """
     from coupled.authority.stability.planes import kinds_of
-    from coupled.authority.stability.whole import bending, map_stability
-    from coupled.cli.tables.stability import print_limits
+    from coupled.authority.stability.whole import compliant_controls, map_stability
+    from coupled.cli.tables import print_table
     from coupled.plots.saving import check_format, save
     from coupled.plots.stability import draw_stability
     from coupled.record.csvfile import write_table
     from coupled.rig.rigfile import read_rig
+    from coupled.tables.stability import limits_table
 
     file = find(rig, shipped_rigs(), "rig")
     data = read_rig(file)
-    bent = bending(data, control or None, "--control")
+    bent = compliant_controls(data, control or None, "--control")
     path = output or Path("out") / f"{data.name}-stability.png"
     table = path.with_suffix(".csv")
     check_format(path)
@@ -66,7 +67,7 @@ def stability(
         write_table(found.to_polars(), outputs.at(table))
         keep_json(listed, json_file, outputs)
     if json_file != "-":
-        print_limits(out, found.limits, found.bob_weight, units)
+        print_table(out, limits_table(found.limits, found.bob_weight, units))
         say(found.disagreement.words)
         say(f"written: {path}")
         say(f"written: {table}")

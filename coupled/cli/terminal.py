@@ -1,4 +1,4 @@
-"""What every command says and how: consoles, progress, one line of a fault, JSON."""
+"""Output of commands: consoles, error messages, JSON."""
 
 from __future__ import annotations
 
@@ -25,19 +25,19 @@ _LONG_WORD = re.compile(rf"(\S{{{LONGEST_WORD}}})\S+")
 
 
 class ReaderGoneError(Exception):
-    """Whoever read the standard output has gone, as `head` does when it has enough."""
+    """The reader of the standard output has closed it, as `head` does."""
 
 
 class SafeConsole(Console):
-    """A console on which no name or header of a file acts: its control characters are `?`.
+    """A console that prints control characters in names and headers of files as `?`.
 
-    A word without end is cut. A reader of the output that has gone ends the command.
+    An overlong word is cut. A closed pipe of the output ends the command.
     """
 
     def render(
         self, renderable: RenderableType, options: ConsoleOptions | None = None
     ) -> Iterable[Segment]:
-        """Yield the segments of what is printed, their text made printable."""
+        """Yield the segments to print, with printable text."""
         for segment in super().render(renderable, options):
             if segment.control:
                 yield segment
@@ -45,12 +45,12 @@ class SafeConsole(Console):
                 yield Segment(printable(segment.text), segment.style)
 
     def render_str(self, text: str, **how: Any) -> Text:
-        """Return a word as text, cut where it has no end."""
+        """Return a word as text, cut if it is overlong."""
         return super().render_str(_LONG_WORD.sub(r"\1…", text), **how)
 
     @contextmanager
     def widened(self, wide: bool) -> Iterator[None]:
-        """Print lines and tables at their own width where asked to, whatever the terminal's."""
+        """Print lines and tables at their full width, not the terminal's, if requested."""
         before = self.width
         if wide:
             self.width = WIDEST
@@ -60,7 +60,7 @@ class SafeConsole(Console):
             self.width = before
 
     def on_broken_pipe(self) -> None:
-        """Leave it to the command line, which ends in silence."""
+        """Raise ReaderGoneError: the command line ends without a message."""
         raise ReaderGoneError
 
 
@@ -74,17 +74,17 @@ def say(text: str) -> None:
 
 
 def say_note(text: str) -> None:
-    """Print a line that a user should know beside a command's output, on the error side."""
+    """Print a note on standard error."""
     err.print(f"[yellow]note:[/] {escape(text)}", soft_wrap=True, highlight=False)
 
 
 def say_error(text: str) -> None:
-    """Print the one line of a fault."""
+    """Print an error in one line."""
     err.print(f"[red]error:[/] {escape(text)}", soft_wrap=True, highlight=False)
 
 
 def check_json(target: str, others: list[Path]) -> None:
-    """Refuse a JSON file that could not be written, or that is one of the others."""
+    """Raise InputError if a JSON file cannot be written or is one of the others."""
     if target == "-" and sys.stdout is None:
         raise InputError("standard output", "--json", "is closed; give a file")
     if target and target != "-":
@@ -92,15 +92,15 @@ def check_json(target: str, others: list[Path]) -> None:
 
 
 def keep_json(table: Any, target: str, outputs: Outputs) -> None:
-    """Write a table as JSON with the command's other files, where a file was asked for."""
+    """Write a table as JSON with the command's other files, if a file was requested."""
     if target not in ("", "-"):
         write_text(outputs.at(Path(target)), json_text(table))
 
 
 def print_json(table: Any, target: str) -> None:
-    """Print a table as JSON where - was asked for.
+    """Print a table as JSON if the file is `-`.
 
-    Where the terminal lacks a letter, or would act on one, JSON's own escapes stand for it.
+    Letters that the terminal lacks, and control characters, are escaped.
     """
     if target != "-":
         return
@@ -119,7 +119,7 @@ def print_json(table: Any, target: str) -> None:
 
 
 def give_json(table: Any, target: str) -> None:
-    """Write a table as JSON where it was asked for; - prints it."""
+    """Write a table as JSON if requested; `-` prints it."""
     with Outputs() as outputs:
         keep_json(table, target, outputs)
     print_json(table, target)

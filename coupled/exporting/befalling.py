@@ -7,18 +7,19 @@ import numpy as np
 from coupled.errors import InputError
 from coupled.exporting.script import Floats, Move, Script
 from coupled.flight.airframe import JSBSimAirframe
-from coupled.flight.altered import ALTERATIONS
+from coupled.flight.altered import alterations
 from coupled.flight.event import OFF, PICK, Event
+from coupled.flight.everyframe import TRIMS
 from coupled.flight.loop import make_airframe
 from coupled.flight.manoeuvre import Manoeuvre
+from coupled.flight.modelparts import Scaled
 from coupled.flight.weather import GUST, Gust, Turbulence, Wind, gust_properties
-from coupled.record.channels import SURFACES
+from coupled.record.channels import SURFACES, ControlName
 from coupled.resources import aircraft_folder
 from coupled.rig.packing import COMMAND_SIGN
 from coupled.rig.parameters import Flight
 from coupled.units import FOOT_m
 
-_TRIMS = {"column": "pitch", "wheel": "roll", "pedals": "yaw"}
 _MOVED = np.linspace(-1.0, 1.0, 201)  # positions of a moved trim
 _MILSPEC = "atmosphere/turbulence/milspec/"
 
@@ -107,22 +108,22 @@ def _add_runaway(script: Script, event: Event, manoeuvre: Manoeuvre) -> None:
     assert control is not None and event.by is not None and flight is not None
     by = COMMAND_SIGN[SURFACES[control]] * event.by
     move = Move(*_shares(event, manoeuvre), by=by)
-    name = f"fcs/{_TRIMS[control]}-trim-cmd-norm"
-    script.moved.setdefault(name, []).append(move)
-    if control == "column":
-        _follow_trim(script, manoeuvre, flight, name)
+    script.moved.setdefault(TRIMS[control], []).append(move)
+    _follow_trim(script, manoeuvre, flight, control)
 
 
-def _follow_trim(script: Script, manoeuvre: Manoeuvre, flight: Flight, name: str) -> None:
+def _follow_trim(
+    script: Script, manoeuvre: Manoeuvre, flight: Flight, control: ControlName
+) -> None:
     """Update the reference of a factor about the trim as the trim moves (`Alterations`)."""
     frame_s, folders = 1.0 / manoeuvre.rig.frame_rate, [aircraft_folder()]
-    for alteration in ALTERATIONS:
-        part = alteration.part
-        if not alteration.about_trim or alteration.factor(flight) == 1.0:
+    name = TRIMS[control]
+    for part, _, about_trim in alterations(flight):
+        if about_trim != control or not isinstance(part, Scaled):
             continue
-        plain = JSBSimAirframe(flight, frame_s, ("column",), folders)
+        plain = JSBSimAirframe(flight, frame_s, (control,), folders)
         known = [each for each in part.properties if plain.has(each)]
-        aircraft = JSBSimAirframe(flight, frame_s, ("column",), folders, record=known)
+        aircraft = JSBSimAirframe(flight, frame_s, (control,), folders, record=known)
         start = aircraft.lever(name).read()
         places = []
         for trim in _MOVED.tolist():

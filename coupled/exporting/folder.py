@@ -39,7 +39,7 @@ def write_export(made: Export, folder: Path) -> None:
             "rig": made.rig.name,
             "loader_steps": made.substeps,
             "left_out": list(made.left),
-            "only_scripted": list(made.scripted),
+            "is_scripted": list(made.scripted),
             "beside": [one.as_dict() for one in made.beside],
             "files": sorted(map(str, files)),
         }
@@ -101,7 +101,8 @@ def _differs(rig: Rig, other: Rig) -> str:
             if rig.flight is other.flight and not differs
             else (differs or ["another aircraft"])[0]
         )
-    for key in ("model", "model_file", "steps_per_frame", *(a.part.name for a in ALTERATIONS)):
+    loaded = ("model", "model_file", "steps_per_frame", "terms")
+    for key in (*loaded, *(a.part.name for a in ALTERATIONS)):
         if getattr(rig.flight, key) != getattr(other.flight, key):
             differs.append(f"flight.{key} = {getattr(other.flight, key)}")
     return differs[0] if differs else ""

@@ -10,7 +10,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from coupled.errors import InputError
-from coupled.flight.altered import ALTERATIONS
+from coupled.flight.altered import ALTERATIONS, alterations
+from coupled.flight.loading import INERTIAS
 from coupled.record.channels import unit_of
 from coupled.rig.parameters import (
     Calibration,
@@ -32,15 +33,8 @@ EXPORTED: Mapping[type[Section], frozenset[str]] = {
     Rig: frozenset(("name", "frame_rate", "controls")),
     Control: frozenset(
         (
-            *(
-                "surface",
-                "travel",
-                "travel_pull",
-                "travel_push",
-                "length",
-                "command_property",
-                "surface_property",
-            ),
+            *("surface", "travel", "travel_pull", "travel_push", "length"),
+            *("command_property", "surface_property"),
         )
     ),
     Loader: frozenset(
@@ -86,17 +80,9 @@ EXPORTED: Mapping[type[Section], frozenset[str]] = {
     ),
     Flight: frozenset(
         (
-            *(
-                "model",
-                "folder",
-                "model_file",
-                "altitude",
-                "calibrated_airspeed",
-                "flight_path",
-                "trim",
-            ),
-            *("properties", "direct_controls", "steps_per_frame", "elevator_effectiveness"),
-            *("pitch_damping", "pitch_stiffness", "lift_slope", "cg_aft", "fuel"),
+            *("model", "folder", "model_file", "altitude", "calibrated_airspeed", "flight_path"),
+            *("trim", "properties", "direct_controls", "steps_per_frame", "cg_aft", "fuel"),
+            *("terms", *(alteration.part.name for alteration in ALTERATIONS)),
         )
     ),
 }
@@ -142,10 +128,11 @@ REFUSED: Mapping[type[Section], Mapping[str, str]] = {
     },
     Flight: {
         **dict.fromkeys(
-            ("gust_rms", "gust_length"),
+            ("gust_rms", "lateral_gust_rms", "gust_length"),
             "gusts drawn from a seed are not exported; use [turbulence]",
         ),
         "mass": "a ballast is not exported; put its weight into the model's file",
+        **dict.fromkeys(INERTIAS, "is not exported; put the inertia into the model's file"),
     },
 }
 
@@ -216,7 +203,7 @@ def _check_section(section: Section, path: str, d: str, file: object) -> list[st
     return left
 
 
-def only_scripted(rig: Rig) -> list[str]:
+def is_scripted(rig: Rig) -> list[str]:
     """Return the settings of a rig's aircraft made by scripts only, a line each with key and why.
 
     Without a script, as in FlightGear, the exported aircraft does not have them.
@@ -228,11 +215,9 @@ def only_scripted(rig: Rig) -> list[str]:
         f"flight.properties: {name} = {value:g}, set before the trim"
         for name, value in flight.properties.items()
     ]
-    for alteration in ALTERATIONS:
-        factor = alteration.factor(flight)
-        if alteration.about_trim and factor != 1.0:
-            name = alteration.part.name
-            found.append(f"flight.{name} = {factor:g}: it counts about the place in trim")
+    for part, factor, about_trim in alterations(flight):
+        if about_trim is not None:
+            found.append(f"flight.{part.name} = {factor:g}: it counts about the place in trim")
     return found
 
 

@@ -25,7 +25,7 @@ from xml.parsers import expat
 from coupled.errors import InputError
 from coupled.exporting.model import Files, model_name
 from coupled.flight.aircraft import make_aircraft
-from coupled.flight.altered import ALTERATIONS, UNALTERED
+from coupled.flight.altered import ALTERATIONS, alterations
 from coupled.resources import aircraft_folder
 from coupled.rig.parameters import Flight
 from coupled.rig.rig import Rig
@@ -66,8 +66,7 @@ def check_load(folder: Path, rig: Rig, file: object) -> None:
     flight = rig.flight
     if flight is None or (flight.cg_aft == 0.0 and flight.fuel == 1.0):
         return
-    plain = {a.part.name: UNALTERED[a.part.name] for a in ALTERATIONS}
-    plain |= {"cg_aft": 0.0, "fuel": 1.0}
+    plain = {"cg_aft": 0.0, "fuel": 1.0, "terms": {}, **{a.part.name: 1.0 for a in ALTERATIONS}}
     own = {"folder": str(folder / "aircraft"), "model_file": ""}
     exported = flight.model_copy(update={**plain, **own})
     frame_s, controls = 1.0 / rig.frame_rate, list(rig.controls)
@@ -110,13 +109,13 @@ def _with_contents(text: bytes, share: float) -> bytes:
 
 
 def _with_factors(text: bytes, flight: Flight) -> bytes:
-    """Return a model with the factors with reference zero (declared by `modelfile`)."""
-    for alteration in ALTERATIONS:
-        part, factor = alteration.part, alteration.factor(flight)
-        if alteration.about_trim or factor == 1.0:
+    """Return a model with the factors with reference zero (declared by `modelparts`)."""
+    for part, factor, about_trim in alterations(flight):
+        if about_trim is not None:
             continue
-        for name, neutral, value in ((part.factor, 1, factor), (part.rest, 0, 1.0 - factor)):
-            declared = f'<property value="{neutral}">{name}</property>'
+        neutral = part.settings(1.0)
+        for name, value in part.settings(factor).items():
+            declared = f'<property value="{neutral[name]:g}">{name}</property>'
             assert declared.encode() in text, name
             stated = f'<property value="{value!r}">{name}</property>'
             text = text.replace(declared.encode(), stated.encode())

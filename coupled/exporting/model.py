@@ -11,13 +11,10 @@ from xml.parsers import expat
 from coupled.errors import InputError, nearest
 from coupled.files import read_bytes
 from coupled.flight.airframe import packaged_models
-from coupled.flight.altered import ALTERATIONS
-from coupled.flight.modelfile import (
-    NothingToScaleError,
-    UnreadableModelError,
-    loadable,
-    parsed,
-)
+from coupled.flight.altered import alterations
+from coupled.flight.modelfile import loadable
+from coupled.flight.modelparts import NothingToScaleError
+from coupled.flight.modeltext import UnreadableModelError, parsed
 from coupled.resources import aircraft_folder
 from coupled.rig.parameters import Flight
 
@@ -61,13 +58,12 @@ def model_files(flight: Flight | None, systems: Sequence[str], file: object) -> 
     if flight is None:
         return {folder / "bench.xml": _including(_BENCH, systems)}
     home = _home(flight, file)
-    parts = [a.part for a in ALTERATIONS if a.factor(flight) != 1.0]
+    parts = [each.part for each in alterations(flight)]
     try:
         with loadable(home / flight.main_file, parts) as made:
             main = read_bytes(made / name / f"{name}.xml")
     except NothingToScaleError as error:
-        problem = f"{name} has no {error.scaled.quantity} that could be scaled; leave it at 1"
-        raise InputError(file, f"flight.{error.scaled.name}", problem) from None
+        raise InputError(file, f"flight.{error.name}", f"{name} has {error.lacking}") from None
     except UnreadableModelError as error:
         raise InputError(file, "flight.model", str(error)) from None
     found: Files = {folder / f"{name}.xml": _including(main, systems)}

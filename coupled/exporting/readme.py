@@ -8,7 +8,7 @@ from coupled.exporting.beside import Beside
 from coupled.exporting.keys import approximated
 from coupled.exporting.model import model_name
 from coupled.exporting.system import System
-from coupled.flight.altered import ALTERATIONS
+from coupled.flight.altered import alterations
 from coupled.record.channels import SURFACES
 from coupled.rig.rig import Rig
 
@@ -68,8 +68,7 @@ def _changed(rig: Rig) -> str:
         changes.append(f"a centre of gravity {flight.cg_aft:g} m further aft")
     if flight.fuel != 1.0:
         changes.append(f"{flight.fuel:g} times the fuel")
-    factors = [(a.part.name, a.factor(flight)) for a in ALTERATIONS]
-    changes += [f"{name} times {factor:g}" for name, factor in factors if factor != 1.0]
+    changes += [f"{part.name} times {factor:g}" for part, factor, _ in alterations(flight)]
     return f", for {', '.join(changes)}" if changes else ""
 
 

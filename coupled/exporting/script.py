@@ -24,7 +24,7 @@ from coupled.rig.equations import specified_gradient
 Floats = NDArray[np.float64]
 CLOSE = 1e-4  # of a table's largest value: tolerance of its thinning
 _TIME = "simulation/sim-time-sec"
-_LOOKING = ("attitude", "track")  # pilots who observe the motion
+_LOOKING = ("attitude", "track", "own")  # pilots who observe the motion
 
 
 @dataclass(frozen=True)

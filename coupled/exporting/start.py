@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -13,9 +13,10 @@ from coupled.exporting.load import POINT, TANKS
 from coupled.exporting.model import Files, parsed_leniently
 from coupled.exporting.script import Script
 from coupled.flight.airframe import JSBSimAirframe
-from coupled.flight.altered import ALTERATIONS
+from coupled.flight.altered import alterations
 from coupled.flight.loop import make_airframe
 from coupled.flight.manoeuvre import Manoeuvre
+from coupled.flight.modelparts import Scaled
 from coupled.record.channels import ALPHA
 from coupled.rig.parameters import Flight, SurfaceProperties
 from coupled.units import KNOT_m_per_s
@@ -70,20 +71,20 @@ def add_start(
         tanks = filter(TANKS, names)
         script.before |= {name: airframe.lever(name).read() for name in tanks}
     script.before |= flight.properties
-    _add_factors(script, flight)
+    _add_factors(script, flight, names)
     if flight.trim == "newton":
         _add_newton(script, airframe, flight, names, files)
         return float(airframe.motion()[ALPHA])
     return None
 
 
-def _add_factors(script: Script, flight: Flight) -> None:
+def _add_factors(script: Script, flight: Flight, names: Sequence[str]) -> None:
     """Add the factors with reference trim; the model has the others."""
-    for alteration in ALTERATIONS:
-        part, factor = alteration.part, alteration.factor(flight)
-        if factor != 1.0 and alteration.about_trim:
-            script.started |= {part.held(name): name for name in part.properties}
-            script.started |= {part.factor: factor, part.rest: 1.0 - factor}
+    for part, factor, about_trim in alterations(flight):
+        if about_trim is not None and isinstance(part, Scaled):
+            known = [name for name in part.properties if name in names]
+            script.started |= {part.held(name): name for name in known}
+            script.started |= part.settings(factor)
 
 
 def _add_newton(

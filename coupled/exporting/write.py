@@ -14,7 +14,7 @@ from coupled.exporting.alone import PROGRAM, fly_alone
 from coupled.exporting.befalling import add_conditions
 from coupled.exporting.beside import Beside, alone_record, beside, properties
 from coupled.exporting.control import control_system
-from coupled.exporting.keys import check_keys, only_scripted
+from coupled.exporting.keys import check_keys, is_scripted
 from coupled.exporting.load import check_load, set_load
 from coupled.exporting.model import Files, model_files, model_name
 from coupled.exporting.readme import readme_text
@@ -104,8 +104,9 @@ def export(
     script is flown by JSBSim alone and compared with our own flight. Raises InputError with the key
     for parts that cannot be exported.
     """
+    rig.check_controlled(file)
     left = check_keys(rig, file)
-    scripted = only_scripted(rig)
+    scripted = is_scripted(rig)
     substeps = math.ceil(rate_Hz / step_rate(rig) - 1e-9)
     if not 1 <= substeps <= MOST_SUBSTEPS:
         problem = f"asks for {substeps} loader steps in a step of JSBSim at {step_rate(rig):g} Hz"

@@ -11,6 +11,7 @@ from coupled.flight.gusts import Gusts
 from coupled.flight.loading import Loading
 from coupled.flight.ownmodel import check_own_model
 from coupled.flight.wrapper import Aircraft, Wrapper
+from coupled.record.channels import ControlName
 from coupled.rig.parameters import Flight
 
 
@@ -60,8 +61,8 @@ def make_unchecked(
 ) -> JSBSimAirframe:
     """Return an aircraft as `make_aircraft` does, of a model that does not crash the process."""
 
-    def plain_aircraft(names: Sequence[str]) -> Aircraft:
-        return JSBSimAirframe(flight, frame_s, ("column",), models, file, names)
+    def plain_aircraft(control: ControlName, names: Sequence[str]) -> Aircraft:
+        return JSBSimAirframe(flight, frame_s, (control,), models, file, names)
 
     wrappers = (
         *conditions,

@@ -32,29 +32,26 @@ from coupled.flight.everyframe import (
     Lever,
     PlainAircraft,
     PlainFrames,
+    PlainSteps,
     Read,
     command_writes,
     mean_reader,
     motion_reader,
     plain_frames,
+    plain_steps,
     stepper,
 )
 from coupled.flight.gusts import GUST_DOWN
-from coupled.flight.modelfile import (
-    NothingToScaleError,
-    UnreadableModelError,
-    catalogue,
-    loadable,
-    models_in,
-    properties_read,
-)
+from coupled.flight.modelfile import catalogue, loadable, models_in, properties_read
+from coupled.flight.modelparts import NothingToScaleError
+from coupled.flight.modeltext import UnreadableModelError
 from coupled.flight.newton import Elevators, newton_trim, why_unbalanced
 from coupled.flight.putback import put_back
 from coupled.flight.surfacemap import flown_through, stops_found
 from coupled.flight.wrapper import Step, Wrapper, led_by
 from coupled.record.channels import ALTITUDE, LONGITUDINAL, SURFACES, motion_channels
 from coupled.rig.parameters import Flight
-from coupled.rig.placed import Placed
+from coupled.rig.placed import HalfFrames, Placed
 from coupled.units import DEGREE_rad, FOOT_m, KNOT_m_per_s
 
 _COMMANDS = {name: f"fcs/{name}-cmd-norm" for name in SURFACES.values()}
@@ -171,14 +168,13 @@ class JSBSimAirframe:
             self._properties.get_node(each, True)
         _log.text = ""
         scaled = [part for wrapper in wrappers for part in wrapper.scaled]
-        ballast = any(wrapper.ballast for wrapper in wrappers)
+        ballasts = sum(wrapper.ballasts for wrapper in wrappers)
         try:
-            with loadable(main, scaled, ballast) as folder:
+            with loadable(main, scaled, ballasts) as folder:
                 fdm.set_aircraft_path(str(folder))
                 loaded = fdm.load_model(name)
         except NothingToScaleError as error:
-            problem = f"{name} has no {error.scaled.quantity} that could be scaled; leave it at 1"
-            raise self.fault(error.scaled.name, problem) from None
+            raise self.fault(error.name, f"{name} has {error.lacking}") from None
         except UnreadableModelError as error:
             raise self.fault("model", f"{name} does not load: {error}") from None
         except RecursionError:
@@ -406,6 +402,10 @@ class JSBSimAirframe:
     def plain_frames(self, placed: Placed) -> PlainFrames | None:
         """Return the fast loop of rig and aircraft; None if wrappers act on the aircraft."""
         return None if self._plain is None else plain_frames(self._plain, placed)
+
+    def plain_steps(self, halves: HalfFrames) -> PlainSteps | None:
+        """Return the fast halves of a frame of rig and aircraft; None if wrappers act on it."""
+        return None if self._plain is None else plain_steps(self._plain, halves)
 
     def extra(self) -> tuple[float, ...]:
         """Return the further properties, in JSBSim's units."""

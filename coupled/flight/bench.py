@@ -6,9 +6,9 @@ from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import Protocol
 
-from coupled.flight.everyframe import PlainFrames
+from coupled.flight.everyframe import PlainFrames, PlainSteps
 from coupled.record.channels import BENCH_MOTION, LOAD, WHOLE_MOTION
-from coupled.rig.placed import Placed
+from coupled.rig.placed import HalfFrames, Placed
 
 _AT_REST = (1.0,) + (0.0,) * (WHOLE_MOTION - len(BENCH_MOTION) - 1)  # its load factor first
 assert len(BENCH_MOTION) == LOAD
@@ -24,6 +24,9 @@ class Airframe(Protocol):
 
     def plain_frames(self, placed: Placed) -> PlainFrames | None:
         """Return the fast loop of rig and airframe; None if wrappers act on it."""
+
+    def plain_steps(self, halves: HalfFrames) -> PlainSteps | None:
+        """Return the fast halves of a frame; None if wrappers act on the airframe."""
 
     def trouble(self) -> str:
         """Return why the flight must end, or an empty string; called below safe_altitude_m."""
@@ -62,6 +65,10 @@ class Bench:
 
     def plain_frames(self, placed: Placed) -> PlainFrames | None:
         """Return None: its frames are stepped one by one."""
+        return None
+
+    def plain_steps(self, halves: HalfFrames) -> PlainSteps | None:
+        """Return None, as `plain_frames` does."""
         return None
 
     def extra(self) -> tuple[float, ...]:

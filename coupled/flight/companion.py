@@ -42,8 +42,8 @@ class FlightAccess:
 class Companion(Protocol):
     """An object called before and after each frame of a flight, such as a live host."""
 
-    elsewhere: bool  # hand and loader are real and not simulated
-    leads: bool  # it may set services of any control, between frames
+    real_loader: bool  # hand and loader are real and not simulated
+    sets_services: bool  # it may set services of any control, between frames
 
     def begin(self, access: FlightAccess) -> None:
         """Start, with the aircraft in trim."""

@@ -12,15 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.errors import InputError
+from coupled.flight.everyframe import TRIMS
 from coupled.flight.wrapper import Aircraft, Hook, Wrapper
 from coupled.record.channels import SURFACES, ControlName
 from coupled.rig.control import ControlArray
 from coupled.rig.packing import COMMAND_SIGN
-from coupled.rig.serving import lead, led
+from coupled.rig.serving import service_command, set_service
 from coupled.schema import Section, named, quantity
 
 Move = Callable[[float], None]  # to a share of the whole, from 0 to 1
-_TRIMS = {"column": "pitch", "wheel": "roll", "pedals": "yaw"}
 # Fuel cut and magnetos off, for the engine selected in JSBSim; −1 selects all.
 OFF = {"propulsion/cutoff_cmd": 1.0, "propulsion/magneto_cmd": 0.0}
 PICK = "propulsion/active_engine"
@@ -113,8 +113,8 @@ def _service(controls: ControlArray, names: Sequence[str], event: Event) -> Move
 
     def move(share: float) -> None:
         nonlocal begun
-        begun = led(controls, names, control, service) if begun is None else begun
-        lead(controls, names, control, service, begun + (to - begun) * share)
+        begun = service_command(controls, names, control, service) if begun is None else begun
+        set_service(controls, names, control, service, begun + (to - begun) * share)
 
     return move
 
@@ -136,8 +136,7 @@ def _trim(aircraft: Aircraft, event: Event, file: object, place: str) -> Move | 
     """Return a function that moves the trim by a share of the surface's travel; shifts add up."""
     if event.trim is None or event.by is None:
         return None
-    name = f"fcs/{_TRIMS[event.trim]}-trim-cmd-norm"
-    lever = aircraft.lever(name, file, f"{place}.trim")
+    lever = aircraft.lever(TRIMS[event.trim], file, f"{place}.trim")
     whole, before = COMMAND_SIGN[SURFACES[event.trim]] * event.by, 0.0
 
     def move(share: float) -> None:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
-from coupled.record.channels import LATERAL, LONGITUDINAL
-from coupled.rig.placed import Placed
+from coupled.record.channels import LATERAL, LONGITUDINAL, ControlName
+from coupled.rig.placed import Commands, HalfFrames, Placed
 from coupled.units import FOOT_m, PSF_Pa
 
 # JSBSim's property behind each motion channel, in the channels' order.
@@ -37,6 +37,13 @@ _LONGITUDINAL = len(LONGITUDINAL)
 PROPERTIES = dict(
     zip(LONGITUDINAL + LATERAL, LONGITUDINAL_PROPERTIES + LATERAL_PROPERTIES, strict=True)
 )
+
+# JSBSim's trim of each control's surface, in its commands.
+TRIMS: Mapping[ControlName, str] = {
+    "column": "fcs/pitch-trim-cmd-norm",
+    "wheel": "fcs/roll-trim-cmd-norm",
+    "pedals": "fcs/yaw-trim-cmd-norm",
+}
 
 
 class Lever(NamedTuple):
@@ -279,3 +286,108 @@ def _three_frames(aircraft: PlainAircraft, placed: Placed) -> PlainFrames:
         return last
 
     return fly
+
+
+class PlainSteps(NamedTuple):
+    """A frame in two halves, as `Frames.steps`; `begun` takes the commands of a host run again."""
+
+    begin: Callable[[int], str]
+    end: Callable[[int, Sequence[float]], None]
+    begun: Callable[[Commands], None]
+
+
+def plain_steps(aircraft: PlainAircraft, halves: HalfFrames) -> PlainSteps | None:
+    """Return the two halves of a frame of rig and aircraft, without calls in between.
+
+    They do what `plain_frames` does. None for rigs with two controls.
+    """
+    if not aircraft.lateral and len(aircraft.writes) == 1:
+        return _column_steps(aircraft, halves)
+    return _three_steps(aircraft, halves) if len(aircraft.writes) == 3 else None
+
+
+def _column_steps(aircraft: PlainAircraft, halves: HalfFrames) -> PlainSteps:
+    qbar, load, elevator, pitch_rate, alpha, pitch, speed, height = aircraft.longitudinal
+    ((write, trim),) = aircraft.writes
+    run, safe_m, trouble = aircraft.run, aircraft.safe_altitude_m, aircraft.trouble
+    host, loaders, address = halves.host_column, halves.loaders, halves.address
+    command = 0.0
+
+    def begin(k: int) -> str:
+        nonlocal command
+        altitude = height() * FOOT_m
+        if not altitude > safe_m and (why := trouble()):
+            return why
+        command = host(
+            address,
+            k,
+            qbar() * PSF_Pa,
+            load(),
+            elevator(),
+            pitch_rate(),
+            alpha(),
+            pitch(),
+            speed() * FOOT_m,
+            altitude,
+        )
+        return ""
+
+    def end(k: int, forces: Sequence[float]) -> None:
+        loaders(address, k, *forces)
+        write(trim + command)
+        run()
+
+    def begun(commands: Commands) -> None:
+        nonlocal command
+        command = commands[0]
+
+    return PlainSteps(begin, end, begun)
+
+
+def _three_steps(aircraft: PlainAircraft, halves: HalfFrames) -> PlainSteps:
+    qbar, load, elevator, pitch_rate, alpha, pitch, speed, height = aircraft.longitudinal
+    aileron, rudder, roll_rate, yaw_rate, beta, roll, heading = aircraft.lateral
+    (write, trim), (second_write, second_trim), (third_write, third_trim) = aircraft.writes
+    run, safe_m, trouble = aircraft.run, aircraft.safe_altitude_m, aircraft.trouble
+    host, loaders, address = halves.host, halves.loaders, halves.address
+    command = second = third = 0.0
+
+    def begin(k: int) -> str:
+        nonlocal command, second, third
+        altitude = height() * FOOT_m
+        if not altitude > safe_m and (why := trouble()):
+            return why
+        turned = heading()  # from 0 to 2π, where both mean north
+        command, second, third = host(
+            address,
+            k,
+            qbar() * PSF_Pa,
+            load(),
+            elevator(),
+            pitch_rate(),
+            alpha(),
+            pitch(),
+            speed() * FOOT_m,
+            altitude,
+            aileron(),
+            rudder(),
+            roll_rate(),
+            yaw_rate(),
+            beta(),
+            roll(),
+            turned if turned <= math.pi else turned - 2.0 * math.pi,
+        )
+        return ""
+
+    def end(k: int, forces: Sequence[float]) -> None:
+        loaders(address, k, *forces)
+        write(trim + command)
+        second_write(second_trim + second)
+        third_write(third_trim + third)
+        run()
+
+    def begun(commands: Commands) -> None:
+        nonlocal command, second, third
+        command, second, third = commands
+
+    return PlainSteps(begin, end, begun)

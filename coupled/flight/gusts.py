@@ -1,11 +1,12 @@
-"""Vertical gusts with the Dryden spectrum.
+"""Vertical and lateral gusts with the Dryden spectrum.
 
 White noise through
 
-    H(s) = σ·√(L/(π·V))·(1 + √3·(L/V)·s)/(1 + (L/V)·s)²      (MIL-F-8785C, w component)
+    H(s) = σ·√(L/(π·V))·(1 + √3·(L/V)·s)/(1 + (L/V)·s)²      (MIL-F-8785C, components v and w)
 
 with L the scale and V the true airspeed, discretised by the bilinear rule. The air is still at the
-start, where the aircraft is trimmed.
+start, where the aircraft is trimmed. A lateral gust is horizontal and across the heading, from the
+left positive.
 """
 
 from __future__ import annotations
@@ -15,22 +16,30 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from coupled.flight.wrapper import Aircraft, Hook, Wrapper
+from coupled.flight.wrapper import Aircraft, Hook, Wrapper, together
 from coupled.record.channels import SPEED
 from coupled.rig.parameters import Flight
 from coupled.units import FOOT_m
 
 GUST_DOWN = "atmosphere/gust-down-fps"  # in addition to wind
+_GUST_NORTH, _GUST_EAST = "atmosphere/gust-north-fps", "atmosphere/gust-east-fps"
+_HEADING = "attitude/psi-rad"
+_UP, _ACROSS = 97, 98  # random streams of a seed
 _BLOCK = 1024  # frames made at a time
 
 
 def dryden(
-    rms_m_per_s: float, length_m: float, speed_m_per_s: float, frame_s: float, seed: int
+    rms_m_per_s: float,
+    length_m: float,
+    speed_m_per_s: float,
+    frame_s: float,
+    seed: int,
+    stream: int = _UP,
 ) -> Iterator[float]:
-    """Yield the air's upward speed in m/s, a frame each, without end."""
+    """Yield the air's speed in m/s, a frame each, without end."""
     top, bottom = dryden_filter(rms_m_per_s, length_m / speed_m_per_s, frame_s)
     (b0, b1, b2), (_, a1, a2) = top, bottom
-    rng = np.random.default_rng([seed, 97])
+    rng = np.random.default_rng([seed, stream])
     later = last = 0.0  # state of the filter in its transposed direct form
     while True:
         # Of unit density over 0 < ω < π/frame.
@@ -57,7 +66,7 @@ def dryden_filter(
 
 
 class Gusts(Wrapper):
-    """Gusts drawn from a seed, if the rig has them, or a given upward speed for each frame."""
+    """Gusts drawn from a seed, if the rig has them; the upward speed may be given by frame."""
 
     def __init__(
         self,
@@ -71,15 +80,37 @@ class Gusts(Wrapper):
 
     def attach(self, aircraft: Aircraft) -> Hook | None:
         """Return a hook that sets the gust of each frame: as given, or from the spectrum."""
-        flight, air = self._flight, self._air
-        if air is None and flight.gust_rms > 0.0:
-            speed = aircraft.motion()[SPEED]
-            air = dryden(flight.gust_rms, flight.gust_length, speed, self._frame_s, self._seed)
-        if air is None:
+        flight, given = self._flight, self._air
+        up = self._drawn(aircraft, flight.gust_rms, _UP) if given is None else iter(given)
+        across = self._drawn(aircraft, flight.lateral_gust_rms, _ACROSS)
+        hooks = [] if up is None else [_rising(aircraft, up)]
+        hooks += [] if across is None else [_crossing(aircraft, across)]
+        return together(hooks)
+
+    def _drawn(self, aircraft: Aircraft, rms_m_per_s: float, stream: int) -> Iterator[float] | None:
+        if rms_m_per_s == 0.0:
             return None
-        down, speeds = aircraft.lever(GUST_DOWN).set, iter(air)
+        lengths = self._flight.gust_length, aircraft.motion()[SPEED]
+        return dryden(rms_m_per_s, *lengths, self._frame_s, self._seed, stream)
 
-        def blow() -> None:
-            down(-next(speeds, 0.0) / FOOT_m)
 
-        return blow
+def _rising(aircraft: Aircraft, speeds: Iterator[float]) -> Hook:
+    down = aircraft.lever(GUST_DOWN).set
+
+    def blow() -> None:
+        down(-next(speeds, 0.0) / FOOT_m)
+
+    return blow
+
+
+def _crossing(aircraft: Aircraft, speeds: Iterator[float]) -> Hook:
+    north, east = aircraft.lever(_GUST_NORTH).set, aircraft.lever(_GUST_EAST).set
+    heading = aircraft.reader(_HEADING)
+    assert heading is not None
+
+    def blow() -> None:
+        speed, turned = next(speeds, 0.0) / FOOT_m, heading()
+        north(-speed * math.sin(turned))
+        east(speed * math.cos(turned))
+
+    return blow

@@ -65,6 +65,13 @@ def in_trim(airframe: JSBSimAirframe, kind: Hashable) -> CachedAircraft:
     return replace(cached, trimmed=cached.state())
 
 
+def started_aircraft(airframe: Airframe, kind: Hashable) -> CachedAircraft:
+    """Return an airframe in its first trim, with its state if a reset may restore it."""
+    if kind is None or not isinstance(airframe, JSBSimAirframe):
+        return CachedAircraft(airframe)
+    return in_trim(airframe, kind)
+
+
 class AircraftCache:
     """A cache of the last flight's aircraft, for another flight of the same kind."""
 
@@ -74,7 +81,7 @@ class AircraftCache:
 
     def take(self, manoeuvre: Manoeuvre, make: Callable[[], Airframe]) -> CachedAircraft:
         """Return an aircraft for a manoeuvre: the cached one, reset, or a new one."""
-        kind = _kind(manoeuvre)
+        kind = flight_kind(manoeuvre)
         # Removed from the cache, so that no two threads fly one aircraft.
         waiting = self._waiting.pop(kind, None)
         if waiting is not None and waiting.restarted():
@@ -82,9 +89,7 @@ class AircraftCache:
         airframe = make()
         # Collecting the properties is slow, so it is done only for a kind that is repeated.
         again, self._asked = kind is not None and kind == self._asked, kind
-        if not again or not isinstance(airframe, JSBSimAirframe):
-            return CachedAircraft(airframe)
-        return in_trim(airframe, kind)
+        return started_aircraft(airframe, kind if again else None)
 
     def keep(self, cached: CachedAircraft) -> None:
         """Keep an aircraft after a complete flight, in place of any other."""
@@ -92,7 +97,7 @@ class AircraftCache:
             self._waiting = {cached.kind: cached}
 
 
-def _kind(manoeuvre: Manoeuvre) -> Hashable:
+def flight_kind(manoeuvre: Manoeuvre) -> Hashable:
     """Return the key of a manoeuvre's aircraft; None if it is not kept."""
     rig = manoeuvre.rig
     flight = rig.flight

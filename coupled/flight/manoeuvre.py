@@ -18,11 +18,12 @@ from coupled.flight.conditions import Conditions
 from coupled.flight.expectation import Expect
 from coupled.flight.pilot import Pilot
 from coupled.flight.pilot.base import Values
+from coupled.flight.pilot.own import Law, PilotOrLaw, as_pilot, check_law
 from coupled.record.channels import ControlName, record_channels, unit_of
 from coupled.rig.equations import bend_loss, felt_gradient
 from coupled.rig.parameters import Control, PlainName
 from coupled.rig.rig import Rig
-from coupled.rig.serving import check_led, has_services, service_channels
+from coupled.rig.serving import check_service, has_services, service_channels
 from coupled.rig.structure import Structure
 from coupled.schema import Given, Section, build, quantity
 
@@ -100,11 +101,13 @@ class Manoeuvre:
     """A flight: a rig, and pilots on some of its controls, for `duration_s` seconds.
 
     rig                 as made by `Rig.changed` and `configured`
-    pilots              {control: pilot}, for example {"column": Step(force_N=50)}; at least one
+    pilots              {control: pilot}, for example {"column": Step(force_N=50)}; at least one.
+                        A pilot may be a function of the state that returns a force in N
     duration_s          up to 7200 s
     seed                of noise, turbulence, gusts and a pilot's remnant
     conditions          wind, gust, turbulence and events; only with an aircraft
     bench               q̄ over time; required for a rig without aircraft, and only there
+    gradient            {control: function of the state}, in place of its schedule, N/d
     record_properties   JSBSim properties that become channels of the record
     configurations      those of a comparison, of `EVERY_CONFIGURATION`
     measure             the subject of a comparison
@@ -126,7 +129,7 @@ class Manoeuvre:
     """
 
     rig: Rig
-    pilots: Mapping[ControlName, Pilot]
+    pilots: Mapping[ControlName, PilotOrLaw]
     duration_s: float
     seed: int = 0
     conditions: Conditions = field(default_factory=Conditions)
@@ -139,14 +142,17 @@ class Manoeuvre:
     label: str = ""
     card: str = ""
     source: Source | None = None
+    gradient: Mapping[ControlName, Law] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if not self.label:
             object.__setattr__(self, "label", self.name)
+        object.__setattr__(self, "pilots", {n: as_pilot(p) for n, p in self.pilots.items()})
         scalars = {"name": self.name, "duration_s": self.duration_s, "seed": self.seed}
         build(Flown, scalars, self.file, "")
         self._check_kind()
         self._check_pilots()
+        self._check_gradient()
         self._check_measure()
         self._check_services()
 
@@ -210,6 +216,7 @@ class Manoeuvre:
         bench.check(file)
 
     def _check_pilots(self) -> None:
+        self.rig.check_controlled(self.rig_file)
         if not self.pilots:
             controls = ", ".join(self.rig.controls)
             raise InputError(self.file, "pilot", f"needs at least one of {controls}")
@@ -221,6 +228,13 @@ class Manoeuvre:
                 problem = f"is {pilot!r:.60}; give a pilot, as Step(force_N=50)"
                 raise InputError(self.file, f"pilot.{control}", problem)
             pilot.check(self.rig, control, self.file)
+
+    def _check_gradient(self) -> None:
+        for control, law in self.gradient.items():
+            if control not in self.rig.controls:
+                problem = f"the rig has no {control}; {nearest(control, self.rig.controls)}"
+                raise InputError(self.file, f"gradient.{control}", problem)
+            check_law(law, self.file, f"gradient.{control}")
 
     def _check_measure(self) -> None:
         control, drawn = self.measure.control, self.measure.drawn
@@ -235,7 +249,7 @@ class Manoeuvre:
         for name, event in self.conditions.event.items():
             if event.service is not None:
                 control, to = str(event.control), float(event.to or 0.0)
-                check_led(self.rig, control, event.service, to, self.file, f"event.{name}")
+                check_service(self.rig, control, event.service, to, self.file, f"event.{name}")
 
 
 def configure(rig: Rig, configuration: Configuration) -> Rig:

@@ -1,13 +1,4 @@
-"""A JSBSim model's file, with a part of its aerodynamics scaled.
-
-In each function F of an axis, the part due to one quantity x is F(x) − F(x₀). A factor k scales
-that part,
-
-    F ← k·F(x) + (1 − k)·F(x₀),
-
-for any form of F: a product has its coefficient scaled, a table its values less that at x₀.
-Functions outside the axis to which F refers are copied with x₀ for x. At k = 1 the model equals the
-filed one to the bit. k and x₀ are properties, set after loading.
+"""The file from which JSBSim loads a model: its own, or one with scalable parts (`modelparts`).
 
 JSBSim loads files only, so the new text is in a temporary folder during loading, beside links to
 the model's other files. The model's own folder is never written to.
@@ -15,76 +6,22 @@ the model's other files. The model's own folder is never written to.
 
 from __future__ import annotations
 
-import copy
 import re
 import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from xml.etree import ElementTree
 
 from coupled.errors import InputError
 from coupled.files import MOST_TEXT_bytes, clear_temporary, read_bytes, temporary_folder
+from coupled.flight.modelparts import Part
+from coupled.flight.modeltext import ModelText, UnreadableModelError, read_xml
 
 Element = ElementTree.Element
-
-
-@dataclass(frozen=True)
-class Scaled:
-    """The part of the aerodynamics due to one quantity.
-
-    `properties` are JSBSim's names of the `quantity`, of which a model may use any; `axes` are
-    those in which its part is scaled, by default all.
-    """
-
-    name: str
-    quantity: str
-    properties: tuple[str, ...]
-    axes: tuple[str, ...] = ()
-
-    @property
-    def factor(self) -> str:
-        """The property of k."""
-        return f"coupled/{self.name}/factor"
-
-    @property
-    def rest(self) -> str:
-        """The property of 1 − k."""
-        return f"coupled/{self.name}/rest"
-
-    def held(self, name: str) -> str:
-        """Return the property of x₀ for one of `properties`."""
-        return f"coupled/{self.name}/held-{self.properties.index(name)}"
-
-
-# A point mass of zero, last in a model's list; `loading` sets its weight and position.
+# Point masses of zero, last in a model's list; `loading` sets their weights and positions.
 BALLAST = "coupled-ballast"
-
-
-class NothingToScaleError(Exception):
-    """A model has no aerodynamics due to a quantity."""
-
-    def __init__(self, scaled: Scaled) -> None:
-        super().__init__(scaled.name)
-        self.scaled = scaled
-
-
-class UnreadableModelError(Exception):
-    """A file of a model cannot be read as XML."""
-
-
-def parsed(text: bytes, name: str) -> Element:
-    """Return the root of a model's XML. Raises UnreadableModelError with the file's name.
-
-    Python's parser raises ParseError for invalid XML, and LookupError or ValueError for an unknown
-    encoding.
-    """
-    try:
-        return ElementTree.fromstring(text)
-    except (ElementTree.ParseError, LookupError, ValueError) as error:
-        raise UnreadableModelError(f"{name} is no XML that can be read: {error}") from None
 
 
 def models_in(folder: Path) -> dict[str, Path]:
@@ -115,7 +52,7 @@ def properties_read(main: Path) -> set[str]:
             continue
         known.add(file)
         try:
-            elements = list(_read(file).iter())
+            elements = list(read_xml(file).iter())
         except (UnreadableModelError, InputError):
             continue
         for element in elements:
@@ -135,22 +72,22 @@ def catalogue(text: str) -> Mapping[str, str]:
 
 
 @contextmanager
-def loadable(main: Path, scaled: Sequence[Scaled], ballast: bool = False) -> Iterator[Path]:
+def loadable(main: Path, scaled: Sequence[Part], ballasts: int = 0) -> Iterator[Path]:
     """Yield the folder of models from which to load a model, with parts of it scalable.
 
     `main` is the model's main file. JSBSim gives the folder of a model and its file one name, so
-    a file of another name gets that of the folder. With `ballast` the model has one more point
-    mass, of zero weight. Raises NothingToScaleError, UnreadableModelError for a file that is not
-    XML, or OSError if a temporary folder cannot be written.
+    a file of another name gets that of the folder. The model has `ballasts` more point masses, of
+    zero weight. Raises NothingToScaleError, UnreadableModelError for a file that is not XML, or
+    OSError if a temporary folder cannot be written.
     """
     folder = main.parent
     name = folder.name
-    if not scaled and not ballast and main.stem == name:
+    if not scaled and not ballasts and main.stem == name:
         yield folder.parent
         return
-    if scaled or ballast:
+    if scaled or ballasts:
         state = main.stat()
-        text = _scalable(main, tuple(scaled), ballast, state.st_mtime_ns, state.st_size)
+        text = _scalable(main, tuple(scaled), ballasts, state.st_mtime_ns, state.st_size)
     else:
         text = read_bytes(main, MOST_TEXT_bytes)
     clear_temporary()
@@ -180,116 +117,23 @@ def _stand_in(place: Path, entry: Path) -> None:
 
 @lru_cache(maxsize=16)
 def _scalable(
-    main: Path, scaled: tuple[Scaled, ...], ballast: bool, changed_ns: int, size: int
+    main: Path, scaled: tuple[Part, ...], ballasts: int, changed_ns: int, size: int
 ) -> bytes:
     """Return a model's text with parts of it scalable; `changed_ns` and `size` key the cache."""
-    folder = main.parent
-    root = _read(main)
-    for one in scaled:
-        aerodynamics = _section(root, folder, "aerodynamics")
-        if aerodynamics is None:
-            raise NothingToScaleError(one)
-        _make_scalable(aerodynamics, one)
-    balance = _section(root, folder, "mass_balance") if ballast else None
+    model = ModelText.of(main)
+    for part in scaled:
+        part.make_scalable(model)
+    balance = model.section("mass_balance") if ballasts else None
     if balance is not None:
-        balance.append(_point_mass())
-    text: bytes = ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)
+        balance.extend(_point_mass(number) for number in range(ballasts))
+    text: bytes = ElementTree.tostring(model.root, encoding="utf-8", xml_declaration=True)
     return text
 
 
-def _read(file: Path) -> Element:
-    return parsed(read_bytes(file, MOST_TEXT_bytes), file.name)
-
-
-def _section(root: Element, folder: Path, name: str) -> Element | None:
-    """Return a section of a model, read from its own file if it has one."""
-    section = root.find(name)
-    if section is not None and (file := section.attrib.pop("file", None)) is not None:
-        own = folder / (file if file.endswith(".xml") else f"{file}.xml")
-        section[:] = list(_read(own))
-    return section
-
-
-def _point_mass() -> Element:
-    made = Element("pointmass", {"name": BALLAST})
+def _point_mass(number: int) -> Element:
+    made = Element("pointmass", {"name": f"{BALLAST}-{number}"})
     ElementTree.SubElement(made, "weight", {"unit": "LBS"}).text = "0"
     place = ElementTree.SubElement(made, "location", {"unit": "IN"})
     for axis in "xyz":
         ElementTree.SubElement(place, axis).text = "0"
     return made
-
-
-def _make_scalable(aerodynamics: Element, scaled: Scaled) -> None:
-    named = {
-        f.attrib["name"].strip(): f for f in aerodynamics.iter("function") if "name" in f.attrib
-    }
-    found = {name: scaled.held(name) for name in scaled.properties}
-    held = dict(found)
-    copies: list[Element] = []
-    without = set[str]()  # functions independent of the quantity
-
-    def depends(function: Element) -> bool:
-        """Tell whether a function depends on the quantity; copy the functions in between."""
-        hit = False
-        for part in function.iter():
-            name = _property(part)
-            if name in named and name not in held and name not in without:
-                without.add(name)
-                if depends(named[name]):
-                    without.discard(name)
-                    held[name] = f"{name}-{scaled.name}-held"
-                    copies.append(_held_copy(named[name], held, held[name]))
-            hit = hit or name in held
-        return hit
-
-    touched = [
-        function
-        for axis in aerodynamics.findall("axis")
-        if not scaled.axes or axis.get("name", "").strip() in scaled.axes
-        for function in axis.findall("function")
-        if depends(function)
-    ]
-    if not touched:
-        raise NothingToScaleError(scaled)
-    for function in touched:
-        _scale(function, scaled, held)
-    values = {scaled.factor: "1", scaled.rest: "0", **dict.fromkeys(found.values(), "0")}
-    for place, (name, value) in enumerate(values.items()):
-        declared = Element("property", {"value": value})
-        declared.text = name
-        aerodynamics.insert(place, declared)
-    first_axis = list(aerodynamics).index(aerodynamics.findall("axis")[0])
-    aerodynamics[first_axis:first_axis] = copies
-
-
-def _property(element: Element) -> str:
-    """Return the property that an element of a function names, or an empty string."""
-    return (element.text or "").strip().removeprefix("-")
-
-
-def _held_copy(function: Element, held: dict[str, str], name: str = "") -> Element:
-    """Return a copy of a function with its references held at x₀."""
-    made = copy.deepcopy(function)
-    for part in made.iter():
-        if (old := _property(part)) in held:
-            part.text = (part.text or "").replace(old, held[old])
-        part.attrib.pop("name", None)  # of a table; names of properties are unique
-    if name:
-        made.set("name", name)
-    return made
-
-
-def _scale(function: Element, scaled: Scaled, held: dict[str, str]) -> None:
-    """Make a function k times its value, plus 1 − k times that at x₀."""
-    bodies = [part for part in function if part.tag != "description"]
-    total = Element("sum")
-    for factor, terms in (
-        (scaled.factor, bodies),
-        (scaled.rest, [_held_copy(body, held) for body in bodies]),
-    ):
-        product = ElementTree.SubElement(total, "product")
-        ElementTree.SubElement(product, "property").text = factor
-        product.extend(terms)
-    for body in bodies:
-        function.remove(body)
-    function.append(total)

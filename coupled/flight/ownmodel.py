@@ -19,6 +19,8 @@ from pathlib import Path
 
 from coupled.errors import InputError
 from coupled.files import clear_temporary
+from coupled.flight.altered import ALTERATIONS
+from coupled.flight.loading import INERTIAS
 from coupled.resources import aircraft_folder
 from coupled.rig.parameters import Flight
 
@@ -28,8 +30,8 @@ UNMADE = 4  # likewise, of properties that nothing creates
 LONGEST_s = 60.0  # a packaged model takes less than 2 s on a slow machine
 # Keys of a flight section that change the loaded files or their content.
 _LOADED = (
-    *("model", "folder", "model_file", "steps_per_frame", "trim", "mass", "elevator_effectiveness"),
-    *("pitch_damping", "pitch_stiffness", "lift_slope", "cg_aft", "fuel"),
+    *("model", "folder", "model_file", "steps_per_frame", "trim", "cg_aft", "fuel", "mass"),
+    *(*INERTIAS, "terms", *(alteration.part.name for alteration in ALTERATIONS)),
 )
 _MOST_FILES = 10_000
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from coupled.flight.aircraft import make_aircraft
 from coupled.flight.airframe import JSBSimAirframe
+from coupled.flight.altered import STILL
 from coupled.record.channels import (
     ALTITUDE,
     HEADING,
@@ -78,7 +79,7 @@ def control_response(
 
     The command is set once a frame; the motion of row k is read before that of row k acts.
     """
-    still = changed(flight, {"gust_rms_m_per_s": 0.0}, file)
+    still = changed(flight, STILL, file)
     moved = controls.index(control)
     return _response(still.model_dump_json(), frame_s, controls, moved, file, rate_rad_per_s)
 

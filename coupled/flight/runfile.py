@@ -180,6 +180,7 @@ def _changed_rig(rig_file: Path, case: Case, file: Path, index: int) -> Rig:
 
 def _pilots(tables: Any, rig: Rig, file: Path) -> dict[ControlName, Pilot]:
     """Return the pilots of a run's tables; a force table's file is beside the run."""
+    rig.check_controlled(rig.file)
     if not isinstance(tables, dict) or not tables:
         raise InputError(file, "pilot", f"needs at least one of {', '.join(rig.controls)}")
     known_keys(tables, dict.fromkeys(CONTROL_NAMES), file, "pilot")

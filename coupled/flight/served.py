@@ -9,13 +9,12 @@ from numpy.typing import NDArray
 
 from coupled.flight.event import service_events
 from coupled.flight.manoeuvre import Manoeuvre
+from coupled.record.channels import ControlName
 from coupled.rig.control import ControlArray
 from coupled.rig.services import SERVICE_CHANNELS
-from coupled.rig.serving import noted, service_channels
+from coupled.rig.serving import copy_service_rows, service_channels
 
 Floats = NDArray[np.float64]
-Frame = Callable[[int, tuple[float, ...]], tuple[float, float, float]]
-
 
 # Channels that are 0 without an active service; the surface's command is not one.
 _RESTING = [i for i, name in enumerate(SERVICE_CHANNELS) if name != "asked_{d}"]
@@ -29,7 +28,7 @@ class Served:
 
     def __init__(self, manoeuvre: Manoeuvre, controls: ControlArray, any_led: bool = False) -> None:
         rig = manoeuvre.rig
-        self._controls, self._names = controls, [str(name) for name in rig.controls]
+        self._controls, self._names = controls, list(rig.controls)
         self._always = manoeuvre.served
         self._which = tuple(rig.controls) if any_led else self._always
         # From the first frame on, so that rows before an event are recorded too.
@@ -37,25 +36,49 @@ class Served:
         controls["state"]["services"]["on"][recorded] = 1
         events = manoeuvre.conditions.event
         self._happen = service_events(events, controls, self._names, 1.0 / rig.frame_rate)
-        shape = (manoeuvre.frames, len(self._which), len(SERVICE_CHANNELS))
-        self._rows = np.zeros(shape if self else (0, *shape[1:]))
+        self._rows = np.zeros((0, len(self._which), len(SERVICE_CHANNELS)))
 
     def __bool__(self) -> bool:
         return bool(self._which)
 
-    def around(self, frame: Frame) -> Frame:
-        """Return the rig's frame with events applied before it, and services recorded after it."""
+    def around(self) -> tuple[Callable[[], None] | None, Callable[[int], None] | None]:
+        """Return the calls before and after a frame's host: events, and what is recorded."""
         if not self:
-            return frame
-        happen, rows = self._happen or (lambda: None), self._rows
+            return None, None
 
-        def served(k: int, motion: tuple[float, ...]) -> tuple[float, float, float]:
-            happen()
-            commands = frame(k, motion)
-            noted(self._controls, self._names, self._which, rows[k])
-            return commands
+        def record(k: int) -> None:
+            copy_service_rows(self._controls, self._names, self._which, self._rows[k])
 
-        return served
+        return self._happen, record
+
+    def row(self, k: int) -> Floats:
+        """Return the services' channels of frame k, in the order of `channels`."""
+        row: Floats = self._rows[k].ravel()
+        return row
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """The channels of the services that a rig file, an event or the user sets."""
+        return tuple(each for name in self._always for each in service_channels(name))
+
+    def extend(self, frames: int) -> None:
+        """Let the flight have so many frames."""
+        if self:
+            more = np.zeros((frames - len(self._rows), *self._rows.shape[1:]))
+            self._rows = np.concatenate((self._rows, more))
+
+    def serve(self, control: ControlName, frames: int, asked: Floats) -> None:
+        """Record a control's services, of so many frames; `asked` are its first rows of δ̂, d."""
+        which = tuple(name for name in self._names if name in (*self._which, control))
+        if which == self._which == self._always:
+            return
+        rows = np.zeros((frames, len(which), len(SERVICE_CHANNELS)))
+        for i, name in enumerate(which):
+            if name in self._which:
+                rows[:, i] = self._rows[:, self._which.index(name)]
+            else:
+                rows[: len(asked), i, SERVICE_CHANNELS.index("asked_{d}")] = asked
+        self._rows, self._which, self._always = rows, which, which
 
     def beside(self, data: Floats, first: int = 0) -> tuple[tuple[str, ...], Floats]:
         """Return the services' channels, and a record's rows from frame `first` with them appended.

@@ -12,7 +12,7 @@ from typing import Protocol
 
 from coupled.errors import InputError
 from coupled.flight.everyframe import Lever
-from coupled.flight.modelfile import Scaled
+from coupled.flight.modelparts import Part
 
 Motion = Callable[[], tuple[float, ...]]
 Step = Callable[[tuple[float, float, float]], None]
@@ -48,14 +48,14 @@ class Wrapper:
     """An addition to an aircraft; this base class does nothing."""
 
     @property
-    def scaled(self) -> tuple[Scaled, ...]:
-        """The parts of the model's aerodynamics that it scales at loading."""
+    def scaled(self) -> tuple[Part, ...]:
+        """The parts of the model's forces and moments that it makes scalable at loading."""
         return ()
 
     @property
-    def ballast(self) -> bool:
-        """Whether it needs a further point mass (`modelfile.BALLAST`)."""
-        return False
+    def ballasts(self) -> int:
+        """How many further point masses it needs (`modelfile.BALLAST`)."""
+        return 0
 
     def load(self, aircraft: Aircraft) -> None:
         """Act on the loaded aircraft before it is trimmed."""
@@ -67,22 +67,26 @@ class Wrapper:
         """Act on the aircraft in trim; return a hook for each frame, if any."""
 
 
-def led_by(hooks: Sequence[Hook], step: Step) -> Step:
-    """Return the step with the hooks called before it, in their order."""
-    if not hooks:
-        return step
-    if len(hooks) == 1:
-        (hook,) = hooks
+def together(hooks: Sequence[Hook]) -> Hook | None:
+    """Return one hook that calls others in their order; None if there are none."""
+    if len(hooks) < 2:
+        return hooks[0] if hooks else None
 
-        def led(commands: tuple[float, float, float], /) -> None:
-            hook()
-            step(commands)
-
-        return led
-
-    def led_by_all(commands: tuple[float, float, float], /) -> None:
+    def act() -> None:
         for hook in hooks:
             hook()
+
+    return act
+
+
+def led_by(hooks: Sequence[Hook], step: Step) -> Step:
+    """Return the step with the hooks called before it, in their order."""
+    hook = together(hooks)
+    if hook is None:
+        return step
+
+    def led(commands: tuple[float, float, float], /) -> None:
+        hook()
         step(commands)
 
-    return led_by_all
+    return led

@@ -18,31 +18,26 @@ from numpy.typing import NDArray
 
 from coupled.errors import InputError
 from coupled.gap.checks import check_record
-from coupled.gap.effects.effect import Effect
+from coupled.gap.effects.effect import Effect, touched
 from coupled.gap.effects.freed import default_keys, freed
 from coupled.gap.effects.scales import Scales
-from coupled.gap.nominalfit import Alike, ChannelFit, NominalFit, Number
+from coupled.gap.findings.inseparable import alike
+from coupled.gap.nominalfit import ChannelFit, NominalFit, Number
+from coupled.gap.prepare import readers_of
 from coupled.gap.search.case import Tell
-from coupled.gap.search.fit import Fit, fit, touched
+from coupled.gap.search.fit import fit_alone
+from coupled.gap.search.found import Fit
 from coupled.gap.signals.drives import as_driven
 from coupled.gap.signals.output import Output
 from coupled.gap.stages.airframe import airframe_outputs
-from coupled.gap.stages.joined import as_judged
 from coupled.gap.stages.stages import Reader
-from coupled.gap.stages.surfaces import surface_points
-from coupled.gap.thresholds import ALIKE, FLOOR_SHARE, LEAST_SERVO_RATIO, SERVO_NEEDED, SHARES_IN
+from coupled.gap.stages.tried import as_judged
+from coupled.gap.thresholds import FLOOR_SHARE, LEAST_SERVO_RATIO, SERVO_NEEDED
 from coupled.record.channels import ControlName
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
 
 Floats = NDArray[np.float64]
-# Why two numbers may act alike, by the last parts of their keys.
-WHY = {
-    frozenset(("friction", "damping")): "all motion is at one speed",
-    frozenset(("friction", "offset")): "all motion is in one direction",
-    frozenset(("mass", "basic_gradient")): "all motion is at one frequency",
-    frozenset(("servo_frequency", "servo_damping_ratio")): "all motion is slow beside the servo",
-}
 
 
 def fit_nominal(
@@ -62,9 +57,7 @@ def fit_nominal(
     rig = as_driven(rig, list(records.values()), control) if control in rig.controls else rig
     for file, record in records.items():
         check_record(rig, record, control, file)
-    readers = [
-        Reader(rig, record, control, surface_points, i) for i, record in enumerate(records.values())
-    ]
+    readers = readers_of(rig, records, control)
     outputs = [output.halved(rig) for output in _outputs(readers)]
     if not outputs:
         problem = "holds too little to judge any stage by, so nothing can be fitted"
@@ -87,7 +80,7 @@ def fit_nominal(
     fits = _fitted(rig, control, outputs, effects, tell)
     numbers = dict(zip(chosen, fits.numbers(rig, control), strict=True))
     scales = Scales.of(readers)
-    information = fits.whole.information
+    groups = fits.whole.groups
     while (worst := _least_determined(numbers, rig, control, effects, scales)) is not None:
         # It stays as filed, and the others are fitted beside that.
         one = numbers[worst]
@@ -106,7 +99,7 @@ def fit_nominal(
         control,
         known,
         found,
-        tuple(one for group in information.items() for one in _alike(rig, control, *group)),
+        tuple(one for group in groups.values() for one in alike(group)),
         tuple(_channel(output, rig, held.rig, files[output.record]) for output in used),
         doubts,
     )
@@ -136,9 +129,9 @@ def _fitted(
     """Return the fits of numbers to every other stretch, to all, and to each record alone."""
     records = len({output.record for output in outputs})
     _tell(tell, "fitting", 0, records + 2)
-    held = fit(rig, control, outputs, effects, part="fitted")
+    held = fit_alone(rig, control, outputs, effects, part="fitted")
     _tell(tell, "fitting to all", 1, records + 2)
-    whole = fit(rig, control, outputs, effects, start=held.values)
+    whole = fit_alone(rig, control, outputs, effects, held.values)
     return _Fits(effects, held, whole, _each(rig, control, outputs, effects, whole, tell))
 
 
@@ -248,7 +241,7 @@ def _each(
     for i, record in enumerate(records if len(records) > 1 else []):
         _tell(tell, f"fitting to record {i + 1} alone", i + 2, len(records) + 2)
         ours = [output for output in outputs if output.record == record]
-        found.append(fit(rig, control, ours, effects, start=whole.values))
+        found.append(fit_alone(rig, control, ours, effects, whole.values))
     return found
 
 
@@ -292,41 +285,6 @@ def _known(rig: Rig, control: ControlName, numbers: Sequence[Number]) -> Rig:
     known = {**data.tolerance, **halves}
     kept = {key: half for key, half in known.items() if not key.startswith("flight.")}
     return rig.changed({**changes, f"controls.{control}.tolerance": kept})
-
-
-def _alike(
-    rig: Rig, control: ControlName, names: tuple[str, ...], information: Floats
-) -> list[Alike]:
-    """Return the numbers of a group whose signatures nearly add up to nothing.
-
-    By the small eigenvalues of the signatures' cosines: where each number may be moved as far as
-    the others make good again.
-    """
-    size = np.sqrt(np.diag(information))
-    moved = size > 0.0
-    if moved.sum() < 2:
-        return []
-    keys = [name.rstrip(".") for name in names]  # of numbers without a name of their own
-    shown = [key for key, on in zip(keys, moved, strict=True) if on]
-    cosines = information[np.ix_(moved, moved)] / np.outer(size[moved], size[moved])
-    strengths, directions = np.linalg.eigh(cosines)
-    found = []
-    for strength, direction in zip(strengths, directions.T, strict=True):
-        if strength > ALIKE:
-            break
-        least = SHARES_IN * float(np.max(np.abs(direction)))
-        shares = [key for key, d in zip(shown, direction, strict=True) if abs(d) >= least]
-        found.append(Alike(tuple(shares), _why(shares)))
-    return found
-
-
-def _why(keys: Sequence[str]) -> str:
-    """Return why numbers act alike, where it is known."""
-    words = [key.partition(".")[2] for key in keys]
-    for pair, why in WHY.items():
-        if len(words) == 2 and all(any(w.startswith(name) for w in words) for name in pair):
-            return why
-    return ""
 
 
 def _channel(output: Output, before: Rig, after: Rig, file: str) -> ChannelFit:

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from coupled.gap.findings.inseparable import Alike
 from coupled.record.channels import ControlName
 from coupled.results import TableResult, frame_of
 from coupled.rig.rig import Rig
@@ -40,26 +41,6 @@ class Number:
         ends = self.interval or (None, None)
         known = {"filed": self.filed, "found": self.found, "low": ends[0], "high": ends[1]}
         return known | ({"at_bound": True} if self.at_bound else {})
-
-
-@dataclass(frozen=True)
-class Alike:
-    """Numbers that these records do not distinguish, by their keys, and why."""
-
-    keys: tuple[str, ...]
-    why: str
-
-    @property
-    def words(self) -> str:
-        """What is to be said of them."""
-        count = {2: "one number", 3: "two numbers"}.get(len(self.keys), "fewer numbers")
-        names = " and ".join((", ".join(self.keys[:-1]), self.keys[-1]))
-        because = f"{self.why}: " if self.why else ""
-        return f"{because}{names} are {count} in these records"
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the JSON."""
-        return {"keys": list(self.keys), "why": self.why, "words": self.words}
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ LONGEST_s = 7200.0  # of a flight, as of a run
 HANDS = ("pilot", "page", "stick")
 
 
-def needs(package: str, what: str) -> None:
+def check_installed(package: str, what: str) -> None:
     """Raise InputError, with the command to install it, if a package of the extra is missing."""
     if importlib.util.find_spec(package) is None:
         problem = f"needs {package}, which is not installed: pip install 'coupled[live]'"

@@ -90,7 +90,7 @@ class Attached:
         controls = self._aboard.controls.copy()
         row = np.zeros((1, len(self._aboard.channels)))
         rate_Hz = self._rig.frame_rate
-        placed = Placed(controls, self._aboard.script, row, rate_Hz, elsewhere=True)
+        placed = Placed(controls, self._aboard.script, row, rate_Hz, real_loader=True)
         motion = self._aboard.airframe.whole_motion()
         while True:
             self._put(controls)

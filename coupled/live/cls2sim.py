@@ -58,7 +58,7 @@ class _Cls2Sim:
         self._controls = [str(control) for control in rig.controls]
         self._travels = [control.travel for control in rig.controls.values()]
         self._reaches = reaches(rig)
-        self._asked = -math.inf  # time of the last request, s
+        self._requested_s = -math.inf  # time of the last request, s
 
     def receive(self, wait_s: float) -> Sample | None:
         """Return the newest sample since the last call; wait for it at most so long."""
@@ -88,7 +88,7 @@ class _Cls2Sim:
                 self.dropped["out of range" if finite else "not a number"] += 1
                 return None
         came_s = self._wire.came_s
-        return Sample(tuple(measured), came_s if math.isfinite(came_s) else self._asked)
+        return Sample(tuple(measured), came_s if math.isfinite(came_s) else self._requested_s)
 
     def own_load(self, i: int, computed: float) -> float:
         """Return the load that the host computes for the loader, N."""
@@ -153,7 +153,7 @@ class External(_Cls2Sim):
             wanted = -self._sign(i) * order.force * self._given.counts_per_N
             counts[AXES.index(name)] = round(min(max(wanted, -MOST_COUNTS), MOST_COUNTS))
             self._loads[i] = order.force
-        self._asked = time.monotonic()
+        self._requested_s = time.monotonic()
         self._wire.send(FORCES.pack(EXTERNAL, *counts))
 
 
@@ -205,7 +205,7 @@ class Version2(_Cls2Sim):
             self._due.popleft()
             if not self._due:
                 found = self._sample([self._measured(i) for i in range(len(self._controls))])
-        return found if self._asked > -math.inf else None
+        return found if self._requested_s > -math.inf else None
 
     def _measured(self, i: int) -> Measured:
         counts, share = self._read[i]
@@ -220,7 +220,7 @@ class Version2(_Cls2Sim):
         """
         if self._due:
             return
-        self._asked = time.monotonic()
+        self._requested_s = time.monotonic()
         for i, order in enumerate(orders):
             share = (self._basic[i] + order.gradient) / self._given.profile
             scale = round(min(max(self._given.scale * share, SCALES[0]), SCALES[1]))

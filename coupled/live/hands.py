@@ -19,7 +19,7 @@ BANDWIDTH_rad_per_s = 10.0  # of the hand that follows a stick
 SMOOTH_s = 0.04  # time constant of the filter on a stick's reading, which comes in steps
 
 
-class Wishes(Protocol):
+class HandPositions(Protocol):
     """A source of hand positions: a stick or the page."""
 
     name: str
@@ -46,7 +46,7 @@ class LiveHand(Pilot):
         return Action(hand=hand)
 
 
-class Follower:
+class PositionFilter:
     """Filters the positions of one control's hand, within the travel in d."""
 
     def __init__(self, travel: float, frame_s: float) -> None:

@@ -18,16 +18,16 @@ import numpy as np
 from coupled.errors import InputError
 from coupled.flight.companion import FlightAccess
 from coupled.live.attached import Attached
-from coupled.live.hands import Follower, Wishes
+from coupled.live.hands import HandPositions, PositionFilter
 from coupled.live.link import Link
 from coupled.live.pacing import Pacer
 from coupled.live.rows import Rows, only_measured
 from coupled.live.safety import Limits
 from coupled.live.service import Adaptation, BendEstimator
-from coupled.live.switches import Switches
 from coupled.record.channels import FRESH, SWITCHED, channel
 from coupled.record.record import Record
-from coupled.rig.serving import check_led, lead, led, services_of
+from coupled.rig.serving import check_service, service_command, services_of, set_service
+from coupled.rig.switches import Switches
 
 STOPPED = "stopped"
 SAVE_EVERY_s = 5.0  # writing a record takes processor time from the frames
@@ -36,7 +36,7 @@ Motion = tuple[float, ...]
 
 @dataclass(frozen=True)
 class Request:
-    """A request of the user: `stop`, `mark`, `save`, `set` of a switch or `lead` of a service.
+    """A request of the user: `stop`, `mark`, `save`, `set` of a switch or `service`.
 
     `text` names the switch or the service of a `control`, or is the text of a mark.
     """
@@ -68,14 +68,14 @@ class Plan:
     """The equipment of a live flight; by default a batch flight in real time.
 
     `paced` is real time; otherwise lock-step: as fast as the loader answers. `link` is a real
-    loader; without it `wishes` moves the hands on the simulated one. `adapt` sets the
+    loader; without it `hand_positions` moves the hands on the simulated one. `adapt` sets the
     compensation's K̂ to the estimated K. `warn` receives urgent messages for the pilot. `save`
     writes a record so far, in a thread, and may raise InputError.
     """
 
     paced: bool = True
     link: Link | None = None
-    wishes: Wishes | None = None
+    hand_positions: HandPositions | None = None
     limits: Limits = field(default_factory=Limits)
     adapt: bool = False
     watchers: Sequence[Watcher] = ()
@@ -98,8 +98,8 @@ class Host:
 
     def __init__(self, plan: Plan) -> None:
         self.plan = plan
-        self.elsewhere = plan.link is not None
-        self.leads = plan.link is None and bool(plan.watchers)
+        self.real_loader = plan.link is not None
+        self.sets_services = plan.link is None and bool(plan.watchers)
         self.events = FlightEvents()
         self.attached: Attached | None = None
         self.time_s = 0.0
@@ -114,10 +114,10 @@ class Host:
         self.access, self.frame_s = access, 1.0 / rig.frame_rate
         self.names = [str(name) for name in rig.controls]
         self.substeps, controls = rig.substeps, list(rig.controls.values())
-        self.switches = Switches(rig, access.controls, access.hands, self.elsewhere)
+        self.switches = Switches(rig, access.controls, access.hands, self.real_loader)
         self.pacer = Pacer(self.frame_s, len(access.data))
         self.rows = Rows(len(access.data), plan.link is not None, plan.paced)
-        self._followers = [Follower(control.travel, self.frame_s) for control in controls]
+        self._filters = [PositionFilter(control.travel, self.frame_s) for control in controls]
         self._columns = [
             [access.channels.index(channel(name, q)) for q in ("force", "computed", "deflection")]
             for name in self.names
@@ -143,54 +143,54 @@ class Host:
         if self.plan.paced:
             self.pacer.wait()
         for watcher in self.plan.watchers:
-            for word in watcher.requests():
-                if word.what == "stop":
+            for request in watcher.requests():
+                if request.what == "stop":
                     return STOPPED
-                self._obey(word)
+                self._execute(request)
         if self.attached is not None:
             return self.attached.listen(self.time_s)
-        if self.plan.wishes is not None:
-            self._lead(self.plan.wishes, k)
+        if self.plan.hand_positions is not None:
+            self._move_hands(self.plan.hand_positions, k)
         return ""
 
-    def _obey(self, word: Request) -> None:
-        if word.what == "save":
+    def _execute(self, request: Request) -> None:
+        if request.what == "save":
             self._save()
-        elif word.what == "mark":
-            self.events.marks.append((self.time_s, word.text[:200]))
-        elif word.what == "lead":
-            self._lead_service(word)
-        elif word.what == "set":
+        elif request.what == "mark":
+            self.events.marks.append((self.time_s, request.text[:200]))
+        elif request.what == "service":
+            self._set_service(request)
+        elif request.what == "set":
             try:
-                self.switches.set(self.time_s, word.control, word.text, word.value)
+                self.switches.set(self.time_s, request.control, request.text, request.value)
             except InputError as error:
                 self.plan.warn(str(error))
 
-    def _lead_service(self, word: Request) -> None:
+    def _set_service(self, request: Request) -> None:
         """Set a service of a simulated loader, as an event of a run does."""
         assert self.access is not None
-        control, service, value = word.control, word.text, word.value
+        control, service, value = request.control, request.text, request.value
         try:
-            if self.elsewhere:
+            if self.real_loader:
                 raise InputError("service", service, "belongs to the real loader; set it there")
-            check_led(self.switches.rig, control, service, value, "service", service)
+            check_service(self.switches.rig, control, service, value, "service", service)
         except InputError as error:
             self.plan.warn(str(error))
             return
-        lead(self.access.controls, self.names, control, service, value)
+        set_service(self.access.controls, self.names, control, service, value)
         self.events.led.append((self.time_s, control, service, value))
 
     def services(self) -> dict[str, dict[str, float]]:
         """Return the services of each simulated control that can be set, and their values."""
-        if self.elsewhere or self.access is None:
+        if self.real_loader or self.access is None:
             return {}
         found: dict[str, dict[str, float]] = {}
         for name in self.names:
             for service in services_of(name):
                 with contextlib.suppress(InputError):
-                    check_led(self.switches.rig, name, service, 0.0, "service", service)
-                    stands = led(self.access.controls, self.names, name, service)
-                    found.setdefault(name, {})[service] = stands
+                    check_service(self.switches.rig, name, service, 0.0, "service", service)
+                    command = service_command(self.access.controls, self.names, name, service)
+                    found.setdefault(name, {})[service] = command
         return found
 
     def _save(self) -> None:
@@ -224,18 +224,18 @@ class Host:
         manifest["live"]["stopped"] = stopped
         if stopped:
             manifest["ended_early"] = None
-        kept = Record(record.channels, record.data, manifest)
+        finished = Record(record.channels, record.data, manifest)
         if self.plan.link is not None:
-            kept = only_measured(kept, self.plan.link, self.switches.rig)
-        return self.rows.beside(kept, first)
+            finished = only_measured(finished, self.plan.link, self.switches.rig)
+        return self.rows.append_to(finished, first)
 
-    def _lead(self, wishes: Wishes, k: int) -> None:
+    def _move_hands(self, positions: HandPositions, k: int) -> None:
         """Write the hands' positions over the next frame."""
         assert self.access is not None
         first, last = k * self.substeps, (k + 1) * self.substeps
-        for i, (name, follower) in enumerate(zip(self.names, self._followers, strict=True)):
-            before = follower.at
-            way = np.linspace(before, follower.move(wishes.read(name)), last - first + 1)
+        for i, (name, position_filter) in enumerate(zip(self.names, self._filters, strict=True)):
+            before = position_filter.at
+            way = np.linspace(before, position_filter.move(positions.read(name)), last - first + 1)
             self.access.script[i, 1, first + 1 : last + 1] = way[1:]
 
     def after(self, k: int, commands: tuple[float, float, float]) -> None:
@@ -252,11 +252,11 @@ class Host:
         for i, (name, at) in enumerate(zip(self.names, self._columns, strict=True)):
             if name in self.service:
                 new = attached is None or attached.measured_now(i)
-                self._serve(name, new, *(float(row[column]) for column in at))
+                self._estimate_bend(name, new, *(float(row[column]) for column in at))
         for watcher in self.plan.watchers:
             watcher.observe(self, k)
 
-    def _serve(
+    def _estimate_bend(
         self, name: str, new: bool, force: float, computed: float, deflection: float
     ) -> None:
         estimator = self.service[name]
@@ -283,8 +283,8 @@ class Host:
         finally:
             for watcher in self.plan.watchers:
                 watcher.close()
-            if self.plan.wishes is not None:
-                self.plan.wishes.close()
+            if self.plan.hand_positions is not None:
+                self.plan.hand_positions.close()
 
     def as_dict(self) -> dict[str, Any]:
         """Return the section `live` of the manifest."""

@@ -25,7 +25,7 @@ class Rows:
         self.validity = np.zeros(frames, np.uint8)
         self.loader_time_s = np.full(frames, math.nan)
 
-    def beside(self, record: Record, first: int) -> Record:
+    def append_to(self, record: Record, first: int) -> Record:
         """Return a record with these channels appended; its first row is frame `first`.
 
         A simulated loader's validity is left out if all rows are fresh.

@@ -9,11 +9,12 @@ import numpy as np
 import polars as pl
 from matplotlib.figure import Figure
 
+from coupled.authority.figures import kept_figure
 from coupled.campaign.entry import AS_FILED
 from coupled.display import System, parameter_label
 from coupled.plots.grids import draw_grid, is_grid
 from coupled.plots.layout import Layout, for_print
-from coupled.plots.sweepview import Shown, coincident, mark_ended, place_of, titled, varying
+from coupled.plots.sweepview import coincident, in_unit, mark_ended, place_of, titled, varying
 
 _COLOURS = ("black", "#d55e00", "#0072b2", "#009e73", "#cc79a7", "#e69f00")
 _MOST_COLUMNS = 4
@@ -52,9 +53,10 @@ def draw_sweep(
     drawn.suptitle(titled(title, remark, width), fontsize=11)
     panels = drawn.subplots(len(figures), len(numeric), squeeze=False, sharex="col", sharey="row")
     for row, name in enumerate(figures):
-        shown = Shown.of(name, system)
+        shown = kept_figure(name, system)
+        figure = in_unit(found, name, shown)
         for column, key in enumerate(numeric):
-            _panel(panels[row, column], found, keys, key, _other(numeric, column), shown)
+            _panel(panels[row, column], figure, keys, key, _other(numeric, column), name)
         panels[row, 0].set_ylabel(shown.label)
     for column, key in enumerate(numeric):
         place_of(panels[-1, column], key, found[key])
@@ -82,21 +84,20 @@ def _other(keys: Sequence[str], column: int) -> str:
 
 
 def _panel(
-    axes: Any, found: pl.DataFrame, keys: Sequence[str], key: str, other: str, shown: Shown
+    axes: Any, found: pl.DataFrame, keys: Sequence[str], key: str, other: str, name: str
 ) -> None:
     configurations = found["configuration"].unique(maintain_order=True).to_list()
-    flown = found.filter((pl.col("ended_early") == "") & pl.col(shown.name).is_not_null())
+    flown = found.filter((pl.col("ended_early") == "") & pl.col(name).is_not_nan())
     alone = [k for k in keys if k != key]
     for configuration, colour in zip(configurations, _COLOURS, strict=False):
         rows = flown.filter(pl.col("configuration") == configuration).sort(key)
         if other and len(configurations) == 1:
-            axes.scatter(rows[key], shown.of_rows(rows), 16, c=rows[other], cmap="viridis")
+            axes.scatter(rows[key], rows[name], 16, c=rows[other], cmap="viridis")
             continue
         # A line joins the flights that differ in this parameter alone; of a draw none do.
         label = "" if configuration == AS_FILED else configuration
         for line in rows.partition_by(alone, maintain_order=True) if alone else [rows]:
-            values = shown.of_rows(line)
-            axes.plot(line[key], values, "o-", ms=3.5, lw=1.0, color=colour, label=label)
+            axes.plot(line[key], line[name], "o-", ms=3.5, lw=1.0, color=colour, label=label)
             label = ""
     mark_ended(axes, np.asarray(found.filter(pl.col("ended_early") != "")[key]))
     axes.grid(alpha=0.25)

@@ -14,7 +14,7 @@ from coupled.gap.findings.result import StageResult
 from coupled.gap.signals.output import Output
 from coupled.gap.thresholds import GUILTY_FROM
 from coupled.plots import gapview as look
-from coupled.plots.gapview import View, channel_label, residual_shown
+from coupled.plots.gapview import View, channel_shown
 
 _MOST = 4  # residuals drawn
 _FILL = {"guilty": "#f6d5bf", "clear": "#cfeae0", "not judged": "0.93"}
@@ -97,8 +97,8 @@ def _caption(found: StageResult | None) -> str:
 
 def _draw_residual(axes: Any, view: View, output: Output, wide: bool) -> None:
     """Draw a residual over time, before and after (`wide`), or what is left of it alone."""
-    scale, unit = residual_shown(output.channel, view.system)
-    factor, time = scale * output.floor, view.time(output)
+    shown = channel_shown(output.channel, view.system, fine=True)
+    factor, time = shown.factor * output.floor, view.time(output)
     before = factor * output.residual(view.diagnosis.nominal)
     after = factor * output.residual(view.diagnosis.improved)
     improved = bool(view.effects)
@@ -115,7 +115,7 @@ def _draw_residual(axes: Any, view: View, output: Output, wide: bool) -> None:
         clear = view.diagnosis.verdict == "no_gap"
         color = look.RIGHT if clear else look.WRONG
         axes.plot(time, before, color=color, linewidth=0.9, label="measured less nominal")
-        title = f"{output.stage}: {channel_label(output.channel)}{view.source(output)}"
+        title = f"{output.stage}: {shown.words}{view.source(output)}"
         axes.set_title(title, fontsize=9, loc="left")
     if improved:
         axes.plot(time, after, color=look.RIGHT, linewidth=0.8, label="with the effects found")
@@ -124,7 +124,7 @@ def _draw_residual(axes: Any, view: View, output: Output, wide: bool) -> None:
         axes.set_ylim(-reach, reach)
         axes.set_title("close up: what is left", fontsize=9, loc="left")
     axes.set_xlim(time[0], time[-1])
-    axes.set_ylabel(f"residual, {unit}", fontsize=9)
+    axes.set_ylabel(shown.labelled("residual"), fontsize=9)
     axes.tick_params(labelsize=8)
     axes.grid(alpha=0.25)
 

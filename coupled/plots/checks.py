@@ -15,9 +15,9 @@ from coupled.plots.pages import (
     BLUE,
     ORANGE,
     case_panels,
+    deflection_shown,
     leg_names,
     pressure,
-    scale,
     title,
     with_legend,
 )
@@ -30,7 +30,8 @@ if TYPE_CHECKING:
 
 def draw_static_checks(found: Documentation, system: System = "si") -> Figure:
     """Draw the static control check: force, and surface, within their tolerance bands."""
-    (factor, unit), newtons = scale(found.control, system), in_system("N", system)
+    shown, newtons = deflection_shown(found.control, system), in_system("N", system)
+    factor = shown.factor
     data = found.rig.controls[found.control]
     rows = 1 if found.surface_rad is None else 2
     figure, grid = case_panels(rows, len(found.conditions), 3.0)
@@ -67,8 +68,8 @@ def draw_static_checks(found: Documentation, system: System = "si") -> Figure:
         for panel in grid[:, i]:
             panel.grid(alpha=0.25)
         for panel in grid[:, i] if len(found.conditions) == 1 else grid[-1:, i]:
-            panel.set_xlabel(f"true deflection δ, {unit}")
-    grid[0, 0].set_ylabel(f"force at the grip F, {newtons.unit}")
+            panel.set_xlabel(shown.labelled("true deflection δ"))
+    grid[0, 0].set_ylabel(newtons.labelled("force at the grip F"))
     if rows > 1:
         grid[1, 0].set_ylabel(f"{data.surface} from trim, °")
     what = "static control check, 14 CFR Part 60, 2.a"

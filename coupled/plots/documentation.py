@@ -21,10 +21,10 @@ from coupled.plots.pages import (
     GRAY,
     GREEN,
     ORANGE,
+    deflection_shown,
     leg_names,
     panels,
     pressure,
-    scale,
     title,
     with_legend,
 )
@@ -56,7 +56,8 @@ def _in_inches(axes: Any) -> None:
 
 def draw_forces(found: Documentation, system: System = "si") -> Figure:
     """Draw force against true deflection at each q̄, swept both ways."""
-    (factor, unit), newtons = scale(found.control, system), in_system("N", system)
+    shown, newtons = deflection_shown(found.control, system), in_system("N", system)
+    factor = shown.factor
     figure, grid = panels(1, len(found.conditions), 3.5)
     for axes, condition in zip(grid[0], found.conditions, strict=True):
         sweeps = (
@@ -73,13 +74,13 @@ def draw_forces(found: Documentation, system: System = "si") -> Figure:
             marks = {"linestyle": "", "marker": "o"} if leg.read else {}
             axes.plot(x, newtons.factor * leg.force, label=name or None, **style, **marks)
         axes.set_title(pressure(condition.pressure_Pa, system), fontsize=10)
-        axes.set_xlabel(f"true deflection δ, {unit}")
+        axes.set_xlabel(shown.labelled("true deflection δ"))
         axes.grid(alpha=0.25)
         if system == "si":
             _in_pounds(axes)
-        if unit == "cm":
+        if shown.unit == "cm":
             _in_inches(axes)
-    grid[0, 0].set_ylabel(f"force at the grip F, {newtons.unit}")
+    grid[0, 0].set_ylabel(newtons.labelled("force at the grip F"))
     figure.suptitle(title(found, "force against deflection, slow sweep both ways"), fontsize=12)
     with_legend(figure, grid[0, 0], 3)
     return figure
@@ -87,7 +88,8 @@ def draw_forces(found: Documentation, system: System = "si") -> Figure:
 
 def draw_deflections(found: Documentation, system: System = "si") -> Figure:
     """Draw computed against true deflection, and what the host's estimate lacks."""
-    factor, unit = scale(found.control, system)
+    shown = deflection_shown(found.control, system)
+    factor = shown.factor
     travel = found.rig.controls[found.control].travel
     figure, grid = panels(1, 2, 3.7)
     left, right = grid[0]
@@ -110,10 +112,10 @@ def draw_deflections(found: Documentation, system: System = "si") -> Figure:
             )
     ends = np.array([-1.0, 1.0]) * factor * travel
     left.plot(ends, ends, color=GRAY, linewidth=4.0, zorder=0, label="δc = δ")
-    left.set_ylabel(f"computed deflection δc, {unit}")
+    left.set_ylabel(shown.labelled("computed deflection δc"))
     right.set_ylabel("δ − δ̂, % of travel")
     for axes in (left, right):
-        axes.set_xlabel(f"true deflection δ, {unit}")
+        axes.set_xlabel(shown.labelled("true deflection δ"))
         axes.grid(alpha=0.25)
     handles, labels = (
         [*some, *others]

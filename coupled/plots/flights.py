@@ -5,19 +5,25 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Callable, Sequence
 from functools import partial
-from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from coupled.authority.figures import corrects_nothing, guessed, named, remarks
+from coupled.authority.figures import (
+    cases_of,
+    corrects_nothing,
+    flown_once,
+    guessed,
+    named,
+    remarks,
+)
 from coupled.authority.held import true_deflection
 from coupled.display import Shown, System, in_system, parameter_label
 from coupled.errors import InputError, listed
 from coupled.plots.histories import legend_above, plain
 from coupled.plots.layout import Layout, for_print
-from coupled.plots.pages import scale
+from coupled.plots.pages import deflection_shown
 from coupled.record.channels import RATE, channel
 from coupled.rig.equations import specified_force
 from coupled.rig.packing import COMMAND_SIGN
@@ -65,9 +71,8 @@ def draw_comparison(
 
     Raises InputError for a panel that is not there.
     """
-    cases = [list(group) for _, group in groupby(flights, key=lambda f: f.outcome.case)]
-    once = len(cases) > 1 and all(len(case) == 1 for case in cases)
-    if once and not layout.panels and not layout.overlay and _steps_are_felt(flights):
+    cases = cases_of(flights)
+    if flown_once(cases) and not layout.panels and not layout.overlay and _steps_are_felt(flights):
         return for_print(_draw_step_panels(cases, system, layout), layout)
     rows: dict[str, Callable[[Any, Sequence[Flight]], None]]
     rows = {"surface": _draw_surface, "motion": _draw_motion, "loss": _draw_loss}
@@ -197,7 +202,7 @@ def _draw_step_panels(cases: Sequence[Sequence[Flight]], system: System, layout:
         axes.label_outer()
     for axes in list(grid.flat)[len(cases) :]:
         axes.set_visible(False)
-    figure.supylabel(f"step of the modifying force at each frame, {unit.unit}", fontsize=10)
+    figure.supylabel(unit.labelled("step of the modifying force at each frame"), fontsize=10)
     figure.suptitle(_title(cases[0][0]), fontsize=12)
     return figure
 
@@ -293,11 +298,11 @@ def _mark_ends(axes: Any, case: Sequence[Flight], name: str, factor: float = 1.0
 def _draw_force(axes: Any, case: Sequence[Flight], system: System) -> None:
     """Force against true deflection, with what was specified."""
     control = case[0].manoeuvre.control
-    (size, unit), newtons = scale(control, system), in_system("N", system)
+    shown, newtons = deflection_shown(control, system), in_system("N", system)
     for flight in case:
         deflection = true_deflection(flight.manoeuvre.rig, control, flight.record)
         force = flight.record[channel(control, "hand_force")]
-        axes.plot(size * deflection, newtons.factor * force, **_line(flight))
+        axes.plot(shown.factor * deflection, newtons.factor * force, **_line(flight))
     record = case[0].record
     deflection = true_deflection(case[0].manoeuvre.rig, control, record)
     peak = int(np.argmax(np.abs(deflection)))
@@ -305,9 +310,9 @@ def _draw_force(axes: Any, case: Sequence[Flight], system: System) -> None:
     pressure = float(record["dynamic_pressure_Pa"][peak])
     wanted = specified_force(case[0].manoeuvre.rig, control, pressure, line)
     style = {"color": "0.65", "linewidth": 4.5, "zorder": 0, "label": "asked, specified"}
-    axes.plot(size * line, newtons.factor * wanted, **style)
-    axes.set_xlabel(f"true deflection of the {control}, {unit}")
-    axes.set_ylabel(f"pilot's force, {newtons.unit}")
+    axes.plot(shown.factor * line, newtons.factor * wanted, **style)
+    axes.set_xlabel(shown.labelled(f"true deflection of the {control}"))
+    axes.set_ylabel(newtons.labelled("pilot's force"))
 
 
 def _draw_loss(axes: Any, case: Sequence[Flight]) -> None:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from coupled.display import System, unit_in
-from coupled.display import shown as shown_in
+from coupled.display import Shown, System, drawn
 from coupled.gap.chain import stage_of
 from coupled.gap.effects.effect import Effect
 from coupled.gap.findings.diagnosis import Diagnosis
@@ -23,21 +22,10 @@ from coupled.gap.thresholds import GUILTY_FROM
 from coupled.record.channels import CONTROL_NAMES
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
-from coupled.units import DEGREE_rad
 
 # Okabe and Ito's colours, as in the other figures: what is wrong is vermilion, what is right green.
 MEASURED, WRONG, RIGHT, RIVAL = "black", "#d55e00", "#009e73", "#0072b2"
 FAINT, SHADE = "0.6", "#e4ecf4"
-_UNITS = {
-    "N_per_m": (1.0, "N/m"),
-    "N_per_rad": (DEGREE_rad, "N/°"),
-    "rad_per_s": (1.0 / DEGREE_rad, "°/s"),
-    "m_per_s": (1.0, "m/s"),
-    "rad": (1.0 / DEGREE_rad, "°"),
-    "Pa": (1e-3, "kPa"),
-    "m": (100.0, "cm"),
-    "N": (1.0, "N"),
-}
 _LABELS = {
     "computed": "computed deflection δc",
     "deflection": "deflection δ at the grip",
@@ -60,21 +48,9 @@ _LABELS = {
 }
 
 
-def unit_shown(name: str, system: System = "si") -> tuple[float, str]:
-    """Return the factor and the unit in which a channel is drawn."""
-    if system == "us" and unit_in(name):
-        unit = shown_in(name, system)
-        return unit.factor, unit.unit
-    for ending, shown in _UNITS.items():
-        if name.endswith("_" + ending):
-            return shown
-    return 1.0, "g" if name == "load_factor" else "1"
-
-
-def residual_shown(name: str, system: System = "si") -> tuple[float, str]:
-    """Return the factor and the unit in which a channel's residual is drawn: small, so mm."""
-    factor, unit = unit_shown(name, system)
-    return (10.0 * factor, "mm") if unit == "cm" else (factor, unit)
+def channel_shown(name: str, system: System = "si", fine: bool = False) -> Shown:
+    """Return a channel's words, and the unit in which it is drawn; `fine` for a residual, in mm."""
+    return replace(drawn(name, system, fine), words=channel_label(name))
 
 
 def channel_label(name: str) -> str:

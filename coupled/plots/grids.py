@@ -11,12 +11,13 @@ from matplotlib import colormaps
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from coupled.authority.figures import kept_figure
 from coupled.campaign.entry import AS_FILED
 from coupled.display import System, parameter_label
 from coupled.errors import InputError
 from coupled.plots.histories import plain
 from coupled.plots.layout import Layout
-from coupled.plots.sweepview import Shown, is_logarithmic, mark_ended, place_of, titled
+from coupled.plots.sweepview import in_unit, is_logarithmic, mark_ended, place_of, titled
 
 Dashes = Literal["-", "--", ":", "-."]
 _MOST_LINES = 8
@@ -60,16 +61,17 @@ def draw_grid(
     drawn.suptitle(f"{title}\ngray: ended early" if ended else title, fontsize=11)
     panels = drawn.subplots(len(figures), columns, squeeze=False, sharex=True, sharey="row")
     for row, name in zip(panels, figures, strict=True):
-        shown = Shown.of(name, system)
+        shown = kept_figure(name, system)
+        figure = in_unit(found, name, shown)
         if as_lines:
             for i, configuration in enumerate(configurations):
-                rows = found.filter(pl.col("configuration") == configuration)
+                rows = figure.filter(pl.col("configuration") == configuration)
                 axes = row[0 if layout.overlay else i]
                 style = _STYLES[i % len(_STYLES)] if layout.overlay else "-"
-                _draw_lines(axes, rows, along, other, shown, style)
+                _draw_lines(axes, rows, along, other, name, style)
             row[0].set_ylabel(shown.label)
         else:
-            _draw_maps(drawn, row, found, along, other, shown)
+            _draw_maps(drawn, row, figure, (along, other), (name, shown.label))
     titles = [""] if layout.overlay else configurations
     for axes, configuration in zip(panels[0], titles, strict=True):
         axes.set_title("" if configuration == AS_FILED else plain(configuration), fontsize=10)
@@ -99,7 +101,7 @@ def draw_grid(
 
 
 def _draw_lines(
-    axes: Any, rows: pl.DataFrame, along: str, other: str, shown: Shown, dashes: str
+    axes: Any, rows: pl.DataFrame, along: str, other: str, name: str, dashes: str
 ) -> None:
     values = rows[other].unique().sort().to_list()
     colours = colormaps["viridis"](np.linspace(0.0, 0.88, len(values)))
@@ -107,25 +109,33 @@ def _draw_lines(
         line = rows.filter((pl.col(other) == value) & (pl.col("ended_early") == "")).sort(along)
         style = {"color": colour, "marker": mark, "markersize": 3.5, "linewidth": 1.2}
         style["linestyle"] = dashes
-        axes.plot(line[along], shown.of_rows(line), label=f"{value:.4g}", **style)
+        axes.plot(line[along], line[name], label=f"{value:.4g}", **style)
     mark_ended(axes, np.asarray(rows.filter(pl.col("ended_early") != "")[along]))
     axes.grid(alpha=0.25)
 
 
 def _draw_maps(
-    drawn: Figure, row: Any, found: pl.DataFrame, along: str, other: str, shown: Shown
+    drawn: Figure,
+    row: Any,
+    found: pl.DataFrame,
+    keys: tuple[str, str],
+    figure: tuple[str, str],
 ) -> None:
-    """Draw a map a configuration, all of a row in the same colours; gray where none was flown."""
+    """Draw a map a configuration, all of a row in the same colours; gray where none was flown.
+
+    `figure` is the figure's column, and its label.
+    """
+    (along, other), (name, label) = keys, figure
     flown = found.with_columns(
-        pl.when(pl.col("ended_early") == "").then(pl.col(shown.name)).otherwise(None)
+        pl.when(pl.col("ended_early") == "").then(pl.col(name)).otherwise(np.nan)
     )
-    values = shown.of_rows(flown)
+    values = flown[name].to_numpy()
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
     places = [found[key].unique().sort().cast(pl.Float64).to_numpy() for key in (along, other)]
     configurations = found["configuration"].unique(maintain_order=True)
     for axes, configuration in zip(row, configurations, strict=True):
         ours = flown.filter(pl.col("configuration") == configuration).sort(other, along)
-        cells = shown.of_rows(ours).reshape(len(places[1]), len(places[0]))
+        cells = ours[name].to_numpy().reshape(len(places[1]), len(places[0]))
         axes.set_facecolor("0.8")
         mesh = axes.pcolormesh(
             *places, cells, shading="nearest", vmin=low, vmax=high, cmap="viridis"
@@ -135,4 +145,4 @@ def _draw_maps(
         row[0].set_yscale("log")
     row[0].set_ylabel(parameter_label(other) + (" (logarithmic)" if logarithmic else ""))
     bar = drawn.colorbar(mesh, ax=list(row), aspect=14)
-    bar.set_label(shown.label, fontsize=9)
+    bar.set_label(label, fontsize=9)

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from coupled.display import drawn, unit_in
 from coupled.errors import InputError, nearest
 from coupled.record.channels import CONTROL_NAMES, RATE, channel, control_channels, unit_of
 from coupled.units import DEGREE_rad
@@ -34,28 +35,18 @@ class Histories(Protocol):
 
 
 _DEGREES = 1.0 / DEGREE_rad
-_SHOWN = {
-    "rad_per_s": ("°/s", _DEGREES),
-    "rad": ("°", _DEGREES),
-    "N": ("N", 1.0),
-    "Pa": ("Pa", 1.0),
-}
-_SHOWN |= {"m_per_s": ("m/s", 1.0), "m": ("m", 1.0), "N_per_m": ("N/m", 1.0)}
-_SHOWN |= {"N_per_rad": ("N/rad", 1.0), "norm": ("of ±1", 1.0)}
 
 
 def draw_channels(record: Histories, channels: Sequence[str], title: str = "") -> Figure:
-    """Draw some channels, one below the other; angles in degrees."""
+    """Draw some channels, one below the other, each in the unit of figures: cm, °, kPa."""
     for name in channels:
         if name not in record.channels:
             raise InputError("record", name, f"no such channel; {nearest(name, record.channels)}")
     panels = []
     for name in channels:
-        ends = [unit for unit in _SHOWN if name.endswith(f"_{unit}")]
-        unit = max(ends, key=len, default="")
-        shown, factor = _SHOWN.get(unit, ("", 1.0))
-        label = name.removesuffix(f"_{unit}").replace("_", " ") + (f", {shown}" if shown else "")
-        panels.append((label, [(name, label, factor)]))
+        shown = drawn(name)
+        label = shown.labelled(name.removesuffix(f"_{unit_in(name)}").replace("_", " "))
+        panels.append((label, [(name, label, shown.factor)]))
     return _drawn(record, panels, title, 1)
 
 
@@ -108,12 +99,12 @@ def _moves(record: Histories, control: str) -> bool:
 def _control_panels(control: str) -> list[tuple[str, list[Line]]]:
     """Return the panels of a control: force in N, deflection in cm or degrees."""
     d = unit_of(control)
-    scale, unit = (100.0, "cm") if d == "m" else (_DEGREES, "°")
+    shown = drawn(f"deflection_{d}")
     named = {"hand_force": "hand", "force": "as read", "modifying_force": "modifying"}
     forces = [(f"{control}_{name}_N", short, 1.0) for name, short in named.items()]
     names = ("deflection", "estimate", "computed")
-    deflections = [(f"{control}_{n}_{d}", n, scale) for n in names]
-    return [(f"{control} force, N", forces), (f"{control} deflection, {unit}", deflections)]
+    deflections = [(f"{control}_{n}_{d}", n, shown.factor) for n in names]
+    return [(f"{control} force, N", forces), (shown.labelled(f"{control} deflection"), deflections)]
 
 
 def _drawn(

@@ -1,4 +1,4 @@
-"""The ladder of a diagnosis: what was tried in each round, and how far each rung leads down."""
+"""The ladder of a diagnosis: what each depth of the search gained, and the gap rung by rung."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from coupled.gap.chain import CHAIN, stage_of
 from coupled.gap.effects.library import EFFECTS
 from coupled.gap.findings.summary import figure as written
 from coupled.gap.findings.summary import in_units, plain
-from coupled.gap.search.rivals import Found
+from coupled.gap.search.found import Found
 from coupled.gap.signals.output import stage_gaps
-from coupled.gap.thresholds import LEAST_GAIN, RIVAL_GAIN
+from coupled.gap.thresholds import RIVAL_GAIN
 from coupled.plots import gapview as look
 from coupled.plots.gapview import View
 
@@ -71,7 +71,7 @@ def _gaps(view: View, rig: Any) -> dict[str, float]:
 def _winner(view: View, k: int, rounds: list[dict[str, float]]) -> Found | None:
     """Return the step that a round gave, if any: a step found since in no later round."""
     later = {name for gains in rounds[k + 1 :] for name in gains}
-    least = max(LEAST_GAIN, max(rounds[k].values()) - RIVAL_GAIN)
+    least = max(0.0, max(rounds[k].values()) - RIVAL_GAIN)
     for step in view.diagnosis.choice.steps:
         name = step.effect.name
         if name not in later and rounds[k].get(name, -np.inf) >= least:
@@ -93,7 +93,6 @@ def _draw_round(axes: Any, view: View, k: int, rounds: list[dict[str, float]], g
     axes.set_yticks(range(len(gains)), [plain(name) for name, _ in gains], fontsize=8)
     axes.set_ylim(-0.7, len(gains) - 0.3)
     axes.axvline(0.0, color="black", linewidth=0.8)
-    axes.axvline(LEAST_GAIN, color=look.WRONG, linewidth=1.2, linestyle=(0, (4, 2)))
     axes.set_title(_headline(k, step), fontsize=9, loc="left")
     axes.grid(alpha=0.25, axis="x")
     out = _screened(view, rounds[k], gaps[min(k, len(gaps) - 1)])
@@ -104,10 +103,10 @@ def _draw_round(axes: Any, view: View, k: int, rounds: list[dict[str, float]], g
 
 def _headline(k: int, step: Found | None) -> str:
     if step is None:
-        return f"round {k + 1}: nothing earns its place"
+        return f"depth {k + 1}: nothing gains"
     rivals = " or ".join(plain(rival.effect.name) for rival in step.rivals)
     doubt = f" (or {rivals})" if rivals else ""
-    return f"round {k + 1}: {plain(step.effect.name)}{doubt}"
+    return f"depth {k + 1}: {plain(step.effect.name)}{doubt}"
 
 
 def _write_gain(axes: Any, place: int, gain: float, weight: str) -> None:
@@ -137,7 +136,7 @@ def _finish_gains(figure: Any, column: Any, rounds: list[dict[str, float]]) -> N
     every = [gain for gains in rounds for gain in gains.values()]
     last = column[-1]
     last.set_xscale("symlog", linthresh=_LINEAR, linscale=0.8)
-    last.set_xlim(min(-_LINEAR, _ROOM * min(every)), _ROOM * max(LEAST_GAIN, *every))
+    last.set_xlim(min(-_LINEAR, _ROOM * min(every)), _ROOM * max(_LINEAR, *every))
     left, right = last.get_xlim()
     span = [-1e6, -1e4, -100, 0, 100, 1e4, 1e6]
     if right < 1e3 and left > -1e3:
@@ -146,18 +145,15 @@ def _finish_gains(figure: Any, column: Any, rounds: list[dict[str, float]]) -> N
     last.set_xticks(ticks, [f"{tick:,.0f}".replace(",", " ") for tick in ticks], fontsize=8)
     last.minorticks_off()
     figure.supxlabel(
-        f"gain on stretches not fitted to, log-likelihood (logarithmic beyond ±{_LINEAR:g})",
+        f"gain in log evidence (logarithmic beyond ±{_LINEAR:g})",
         fontsize=9,
     )
     marks = [
         _bar(last, {"color": look.RIGHT}, "found"),
         _bar(last, {"facecolor": "white", "edgecolor": look.RIVAL, "hatch": "////"}, "rival"),
         _bar(last, {"color": "0.78"}, "tried"),
-        last.plot([], [], color=look.WRONG, linestyle=(0, (4, 2)), label=f"least, {LEAST_GAIN:g}")[
-            0
-        ],
     ]
-    figure.legend(handles=marks, loc="outside upper center", ncols=4, fontsize=8, frameon=False)
+    figure.legend(handles=marks, loc="outside upper center", ncols=3, fontsize=8, frameon=False)
 
 
 def _bar(axes: Any, style: dict[str, Any], label: str) -> Any:

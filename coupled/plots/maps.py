@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from scipy.spatial import ConvexHull, Delaunay, QhullError
 
 from coupled.display import System, in_system, pressure_shown
-from coupled.plots.pages import BLUE, GRAY, GREEN, ORANGE, panels, scale, with_legend
+from coupled.plots.pages import BLUE, GRAY, GREEN, ORANGE, deflection_shown, panels, with_legend
 from coupled.record.channels import ControlName
 from coupled.units import POUND_N, KNOT_m_per_s
 
@@ -98,25 +98,25 @@ def _draw_row(
 ) -> None:
     """Draw the maps of a control, in the same colours."""
     pressure = pressure_shown(system)
-    factor, unit = scale(ours[0][1].control, system)
+    deflection = deflection_shown(ours[0][1].control, system)
     least, most = _range(ours, flown)
     for axes, loss_map in ours:
         axes.set_visible(True)
         mesh = axes.pcolormesh(
             pressure.factor * loss_map.pressure_Pa,
-            factor * loss_map.deflection,
+            deflection.factor * loss_map.deflection,
             100.0 * loss_map.loss.T,
             cmap="RdBu_r" if least < 0.0 else "Reds",
             vmin=least,
             vmax=most,
             shading="gouraud",
         )
-        _outline(axes, flown, (pressure.factor, factor))
+        _outline(axes, flown, (pressure.factor, deflection.factor))
         axes.set_facecolor(GRAY)  # no loss: the loader rests, or the grip does not go so far
-        axes.set_ylim(0.0, factor * loss_map.deflection[-1])
+        axes.set_ylim(0.0, deflection.factor * loss_map.deflection[-1])
         axes.set_title(f"{loss_map.control}, {loss_map.configuration}", fontsize=10)
-        axes.set_xlabel(f"dynamic pressure q̄, {pressure.unit}")
-    ours[0][0].set_ylabel(f"true deflection δ, {unit}")
+        axes.set_xlabel(pressure.labelled("dynamic pressure q̄"))
+    ours[0][0].set_ylabel(deflection.labelled("true deflection δ"))
     beyond = "both" if least < 0.0 else "max"
     bar = figure.colorbar(mesh, ax=[axes for axes, _ in ours], extend=beyond)
     bar.set_label("loss, % of δ")
@@ -188,7 +188,7 @@ def draw_feel(name: str, feel: Feel, system: System = "si") -> Figure:
             word, color, style, width = _STYLES[configuration]
             x, y = pressure.factor * feel.pressure_Pa, force.factor * np.asarray(values)
             axes.plot(x, y, color=color, linestyle=style, linewidth=width, label=word)
-        axes.set_xlabel(f"dynamic pressure q̄, {pressure.unit}")
+        axes.set_xlabel(pressure.labelled("dynamic pressure q̄"))
         axes.set_ylabel(label)
         axes.grid(alpha=0.25)
     # 14 CFR 25.173: at least 1 lbf per 6 kt

@@ -6,9 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 from matplotlib.figure import Figure
 
-from coupled.display import System, in_system, pressure_in
+from coupled.display import Shown, System, drawn, pressure_in
 from coupled.record.channels import unit_of
-from coupled.units import DEGREE_rad
 
 if TYPE_CHECKING:
     from coupled.calibration.documentation import Documentation, FeelCondition
@@ -17,12 +16,9 @@ NARROWEST = 7.4  # inches that a page's title needs
 GRAY, ORANGE, GREEN, BLUE = "0.62", "#d55e00", "#009e73", "#0072b2"
 
 
-def scale(control: str, system: System = "si") -> tuple[float, str]:
-    """Return the factor and unit in which a control's deflection is drawn."""
-    if system == "us":
-        shown = in_system(unit_of(control), system)
-        return shown.factor, shown.unit
-    return (100.0, "cm") if unit_of(control) == "m" else (1.0 / DEGREE_rad, "°")
+def deflection_shown(control: str, system: System = "si") -> Shown:
+    """Return the unit in which a control's deflection is drawn."""
+    return drawn(f"deflection_{unit_of(control)}", system)
 
 
 def plain(text: str, longest: int = 20) -> str:

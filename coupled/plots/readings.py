@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from coupled.display import System, in_system
-from coupled.plots.pages import plain, scale
+from coupled.plots.pages import deflection_shown, plain
 from coupled.record.channels import unit_of
 from coupled.units import POUND_N, INCH_m
 
@@ -35,7 +35,8 @@ def plus_minus(found: Estimate) -> str:
 
 def draw_readings(found: CalibrationResult, source: str, system: System = "si") -> Figure:
     """Draw the report's figure 4: readings at each gradient with the fit, and what is left."""
-    factor, unit = scale(found.control, system)
+    shown = deflection_shown(found.control, system)
+    factor, unit = shown.factor, shown.unit
     figure = Figure(figsize=(8.2, 6.8), layout="constrained")
     top, below = figure.subplots(2, 1, height_ratios=(2.4, 1.0), sharex=True)
     readings, line = found.readings, found.line
@@ -47,18 +48,18 @@ def draw_readings(found: CalibrationResult, source: str, system: System = "si") 
         color, mark = _SETS[i % len(_SETS)], _MARKS[i % len(_MARKS)]
         gradient = float(f @ d / (d @ d))
         own = in_system(f"N/{unit_of(found.control)}", system)
-        shown = f"{own.written(gradient)} {own.unit}"
+        name = f"set {plain(label)}: {own.written(gradient)} {own.unit}"
         if unit == "cm":
-            shown += f" ({gradient * INCH_m / POUND_N:.3g} lb/in)"
+            name += f" ({gradient * INCH_m / POUND_N:.3g} lb/in)"
         style: dict[str, Any] = {"color": color, "marker": mark, "linestyle": "none"}
-        top.plot(factor * d, readings.v1[ours], label=f"set {plain(label)}: {shown}", **style)
+        top.plot(factor * d, readings.v1[ours], label=name, **style)
         reach = np.array([min(0.0, np.min(d)), max(0.0, np.max(d))])  # of a push and of a pull
         top.plot(factor * reach, (a + b * gradient) * reach, color=color, linewidth=0.9)
         below.plot(factor * d, line.residual[ours], **style)
     below.axhline(0.0, color="black", linewidth=0.8)
     top.set_ylabel(f"v₁, {readings.signal}")
     below.set_ylabel(f"v₁ − fit, {readings.signal}")
-    below.set_xlabel(f"deflection δ, {unit}")
+    below.set_xlabel(shown.labelled("deflection δ"))
     for axes in (top, below):
         axes.grid(alpha=0.25)
     handles, labels_shown = top.get_legend_handles_labels()

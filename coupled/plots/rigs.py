@@ -19,6 +19,7 @@ _POINTS = 200
 
 def draw_rig(rig: Rig) -> Figure:
     """Draw each control's G_T over q̄, and the share that its bend takes without a correction."""
+    rig.check_controlled(rig.file)
     rows = len(rig.controls)
     figure = Figure(figsize=(8.2, 0.7 + 2.2 * rows), layout="constrained")
     grid = figure.subplots(rows, 2, squeeze=False, sharex=True)

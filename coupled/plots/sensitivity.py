@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from coupled.authority.figures import kept_figure
 from coupled.campaign.sensitivity import SobolIndex
 from coupled.display import parameter_label
 from coupled.plots.pages import BLUE, GRAY, ORANGE, plain
-from coupled.plots.sweepview import WORDS
 
 _LONGEST = 44  # letters of a parameter
 
@@ -41,7 +41,7 @@ def draw_sensitivity(indices: Sequence[SobolIndex]) -> Figure:
                 if (index.figure, index.configuration) == (figure, configuration)
             }
             _panel(axes, [here[key] for key in keys])
-            name = WORDS[figure]  # a share of variance has not its unit
+            name = kept_figure(figure).words  # a share of variance has not its unit
             axes.set_title(f"{name}: {plain(configuration)}", fontsize=10)
             axes.set_yticks(range(len(keys)), [_label(key) for key in keys], fontsize=8)
     for axes in grid[-1]:

@@ -11,13 +11,12 @@ from matplotlib.figure import Figure
 
 from coupled.display import System
 from coupled.gap.chain import BY_NAME as STAGE_OF
-from coupled.gap.effects.effect import Effect, Signature
+from coupled.gap.effects.effect import Effect, Signature, touched
 from coupled.gap.effects.library import WHOLE_s
 from coupled.gap.findings.summary import change, in_units, plain
-from coupled.gap.search.fit import touched
 from coupled.gap.signals.output import Floats, Output
 from coupled.plots import gapview as look
-from coupled.plots.gapview import View, channel_label, style_of, unit_shown
+from coupled.plots.gapview import View, channel_shown, style_of
 from coupled.plots.signals import SIGNALS, Scene
 from coupled.plots.structure import draw_structure
 from coupled.rig.rig import Rig
@@ -168,7 +167,8 @@ def _draw_zoom(
     axes: Any, view: View, output: Output, models: Sequence[_Model], length_s: float
 ) -> None:
     """Draw measured and predicted over time, where they differ most; the input beneath."""
-    factor, unit = unit_shown(output.channel, view.system)
+    shown = channel_shown(output.channel, view.system)
+    factor = shown.factor
     made = [(model, factor * output.predict(model.rig)) for model in models]
     rows = _widest_window(made[1][1] - made[0][1], round(length_s * output.frame_rate_Hz))
     time = view.time(output)[rows]
@@ -191,7 +191,7 @@ def _draw_zoom(
         axes.plot(time, whole[rows], label=model.label, **style_of(model.kind))
     axes.set_xlim(time[0], time[-1])
     axes.set_xlabel("time, s", fontsize=9)
-    axes.set_ylabel(f"{channel_label(output.channel)}, {unit}", fontsize=9)
+    axes.set_ylabel(shown.label, fontsize=9)
     axes.set_title(
         "the whole record" if length_s == WHOLE_s else "where they differ most",
         fontsize=9,

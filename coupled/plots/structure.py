@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from coupled.display import Shown
 from coupled.gap.findings.summary import plain
 from coupled.gap.noise.smooth import rate_of, smoothed
 from coupled.gap.signals.output import Floats, Output
 from coupled.plots import gapview as look
-from coupled.plots.gapview import View, channel_label, residual_shown, unit_shown
+from coupled.plots.gapview import View, channel_shown
 from coupled.record.channels import unit_of
 
 _BINS = 24
@@ -22,8 +23,8 @@ def draw_structure(figure: Any, view: View) -> None:
     """Draw what is left of the widest residual against each signal, and its spectrum."""
     improved = view.diagnosis.improved
     output = max(view.suspects(), key=lambda o: o.gap(improved))
-    scale, unit = residual_shown(output.channel, view.system)
-    left = scale * output.floor * output.residual(improved)
+    shown = channel_shown(output.channel, view.system, fine=True)
+    left = shown.factor * output.floor * output.residual(improved)
     line = _spectrum(left, output.frame_rate_Hz)
     panels = [(_share(signal, left), label, signal) for label, signal in _signals(view, output)]
     panels.append((line.share, "", left))
@@ -31,27 +32,26 @@ def draw_structure(figure: Any, view: View) -> None:
     grid = list(figure.subplots(2, 3).flat)
     for i, (axes, (share, label, signal)) in enumerate(zip(grid, panels, strict=False)):
         if label:
-            _draw_against(axes, signal, left, label, unit)
+            _draw_against(axes, signal, left, label, shown)
             title = f"{100.0 * share:.0f} % of its variance goes with it"
         else:
-            _draw_spectrum(axes, line, unit)
+            _draw_spectrum(axes, line, shown)
             title = f"{100.0 * share:.0f} % of its power at {line.frequency[line.peak]:.3g} Hz"
         axes.set_title(f"{i + 1}. {title}", fontsize=9, loc="left")
         axes.grid(alpha=0.25)
         axes.tick_params(labelsize=8)
     for axes in grid[len(panels) :]:
         axes.set_visible(False)
-    label = channel_label(output.channel)
-    what = f"{plain(output.stage)}: residual of the {label}{view.source(output)}"
+    what = f"{plain(output.stage)}: residual of the {shown.words}{view.source(output)}"
     gap = output.gap(improved)
     figure.suptitle(f"{what}, {gap:.3g} × its floor, against what it may go with", fontsize=11)
 
 
-def _draw_against(axes: Any, signal: Floats, left: Floats, label: str, unit: str) -> None:
+def _draw_against(axes: Any, signal: Floats, left: Floats, label: str, unit: Shown) -> None:
     axes.plot(*_thin(signal, left), ".", color="0.7", markersize=2.0, rasterized=True)
     axes.plot(*_means(signal, left), "o-", color=look.RIVAL, markersize=3.0, linewidth=1.2)
     axes.set_xlabel(label, fontsize=9)
-    axes.set_ylabel(f"residual, {unit}", fontsize=9)
+    axes.set_ylabel(unit.labelled("residual"), fontsize=9)
 
 
 def _signals(view: View, output: Output) -> list[tuple[str, Floats]]:
@@ -61,13 +61,13 @@ def _signals(view: View, output: Output) -> list[tuple[str, Floats]]:
     found: list[tuple[str, Floats]] = []
     for name in (f"{control}_force_N", f"{control}_computed_{d}", "dynamic_pressure_Pa"):
         if name in record:
-            factor, unit = unit_shown(name, view.system)
-            found.append((f"{channel_label(name)}, {unit}", factor * record[name]))
+            shown = channel_shown(name, view.system)
+            found.append((shown.label, shown.factor * record[name]))
     computed = f"{control}_computed_{d}"
     if computed in record:
-        factor, unit = unit_shown(computed, view.system)
-        speed = factor * rate_of(smoothed(record[computed]), output.frame_rate_Hz)
-        found.append((f"deflection's rate δc′, {unit}/s", speed))
+        shown = channel_shown(computed, view.system)
+        speed = shown.factor * rate_of(smoothed(record[computed]), output.frame_rate_Hz)
+        found.append((f"deflection's rate δc′, {shown.unit}/s", speed))
     return [*found, ("time, s", view.time(output))]
 
 
@@ -120,11 +120,11 @@ def _spectrum(left: Floats, frame_rate_Hz: float) -> _Spectrum:
     return _Spectrum(frequency, amplitude, peak, share)
 
 
-def _draw_spectrum(axes: Any, found: _Spectrum, unit: str) -> None:
+def _draw_spectrum(axes: Any, found: _Spectrum, unit: Shown) -> None:
     """Draw the amplitude of each frequency, which shows a motion of its own."""
     axes.plot(found.frequency[1:], found.amplitude[1:], color=look.RIVAL, linewidth=0.9)
     at = found.frequency[found.peak]
     axes.plot(at, found.amplitude[found.peak], "o", color=look.WRONG, markersize=4)
     axes.set_xscale("log")
     axes.set_xlabel("frequency, Hz (logarithmic)", fontsize=9)
-    axes.set_ylabel(f"amplitude, {unit}", fontsize=9)
+    axes.set_ylabel(unit.labelled("amplitude"), fontsize=9)

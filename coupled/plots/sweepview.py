@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from coupled.display import System, parameter_label, shown
+from coupled.authority.figures import kept_figure
+from coupled.display import Shown, System, parameter_label
 from coupled.errors import listed
 from coupled.plots.histories import plain
 
@@ -22,43 +22,11 @@ _STILL = 1e-9  # what a figure spreads by where it does not vary: the arithmetic
 _EVEN = 1e-3  # of a step, by which steps differ that are taken as even
 _ONE_LINE = 0.01  # of a figure's span, within which lines are one to the eye
 _WIDE = 10.0  # greatest over least value of an axis that may be logarithmic
-WORDS = {
-    "asked_norm": "surface asked",
-    "reached_norm": "surface reached",
-    "loss": "authority lost",
-    "loss_closed_form": "loss by closed form",
-    "felt_ratio": "felt over specified",
-    "felt_ratio_closed_form": "felt by closed form",
-    "force_N": "force needed",
-    "force_step_N": "force step",
-    "peak_rate_rad_per_s": "peak rate",
-    "peak_load_factor": "peak load factor",
-    "time_to_attitude_s": "time to attitude",
-    "surface_stop_norm": "surface at its stop",
-}
 
 
-@dataclass(frozen=True)
-class Shown:
-    """A figure of the table as people see it: its label, and the factor to the label's unit."""
-
-    name: str
-    label: str
-    factor: float
-
-    @classmethod
-    def of(cls, name: str, system: System = "si") -> Shown:
-        """Return a figure by its column's name, in the unit that a terminal's table has."""
-        if name not in WORDS:
-            return cls(name, parameter_label(name), 1.0)
-        unit = shown(name, system)
-        of_travel = " of travel" if unit.unit == "%" and name.endswith("_norm") else ""
-        label = f"{WORDS[name]}, {unit.unit}{of_travel}" if unit.unit else WORDS[name]
-        return cls(name, label, unit.factor)
-
-    def of_rows(self, rows: pl.DataFrame) -> Floats:
-        """Return the figure of each row in the label's unit; NaN where there is none."""
-        return self.factor * rows[self.name].cast(pl.Float64).fill_null(np.nan).to_numpy()
+def in_unit(found: pl.DataFrame, name: str, unit: Shown) -> pl.DataFrame:
+    """Return a table with a column of numbers in a unit, NaN where it has no value."""
+    return found.with_columns(pl.col(name).cast(pl.Float64).fill_null(np.nan) * unit.factor)
 
 
 def varying(
@@ -74,7 +42,7 @@ def varying(
         values = flown[name].drop_nulls().cast(pl.Float64).to_numpy()
         size = float(np.max(np.abs(values), initial=0.0))
         if values.size and np.ptp(values) <= _STILL * max(size, 1.0):
-            each = Shown.of(name, system)
+            each = kept_figure(name, system)
             level = each.factor * float(np.median(values))
             still.append(f"{each.label}: {0.0 if abs(level) < _STILL else level:.4g}")
         else:
@@ -102,7 +70,7 @@ def coincident(found: pl.DataFrame, keys: Sequence[str], figures: Sequence[str])
                     break
             else:
                 groups.append(([configuration], line))
-        word = WORDS.get(name, parameter_label(name))
+        word = kept_figure(name).words
         said += [
             f"{word[0].upper()}{word[1:]}: {listed(names[:-1])} and {names[-1]} coincide."
             for names, _ in groups

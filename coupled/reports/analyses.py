@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 
-from coupled.authority.stability.limits import Limit
 from coupled.authority.stability.whole import Stability
 from coupled.authority.whole import AuthorityMap
-from coupled.calibration.plan import Station
 from coupled.calibration.planned import ReadingsPlan
 from coupled.calibration.readings import Readings
 from coupled.display import percent
@@ -18,8 +14,10 @@ from coupled.plots.maps import draw_feel, draw_losses
 from coupled.plots.saving import svg_text
 from coupled.plots.stability import draw_stability
 from coupled.plots.taken import draw_taken
-from coupled.record.channels import unit_of
-from coupled.reports.page import Cell, Drawing, Made, Mark, Report, Section, Table, Verdict
+from coupled.reports.page import Drawing, Made, Report, Section, Verdict
+from coupled.tables.calibration import grids_table, plan_table, readings_table
+from coupled.tables.stability import limits_table
+from coupled.tables.table import Table
 
 _LOSSES = "The share of the asked deflection that is lost, over q̄ and deflection."
 _FEEL = "Stick force per g and per knot, as specified and with each correction."
@@ -35,7 +33,7 @@ def map_report(found: AuthorityMap, made: Made) -> Report:
             there = one.loss[np.isfinite(one.loss)]
             most = percent(float(there.max())) if there.size else "–"
             rows.append((one.control, one.configuration, most))
-    table = Table(("control", "configuration", "lost at most"), tuple(rows), words=2)
+    table = Table(("control", "configuration", "lost at most"), tuple(rows), align="llr")
     sections = [
         Section("Losses", (table, Drawing(svg_text(draw_map(found)), _LOSSES))),
     ]
@@ -55,15 +53,8 @@ def draw_map(found: AuthorityMap) -> Figure:
 
 def stability_report(found: Stability, made: Made) -> Report:
     """Return the report of a rig's stability: limits and maps."""
-    heads = ("", "stable", "simulated", "theory", "filed")
-    blocks = []
-    for control in found.limits:
-        rows = tuple(_limit(limit) for limit in control.limits)
-        unit = f"N/{unit_of(control.control)}"
-        caption = f"{control.control}: {control.gradient:.4g} {unit}, K·G_T = {control.share:.3g}"
-        blocks.append(Table(heads, rows, caption, words=2))
     sections = (
-        Section("Limits at the stiffest gradient", tuple(blocks)),
+        Section("Limits at the stiffest gradient", (limits_table(found.limits, found.bob_weight),)),
         Section("Maps", (Drawing(svg_text(draw_planes(found)), _PLANES),)),
     )
     out = [
@@ -85,23 +76,11 @@ def draw_planes(found: Stability) -> Figure:
     return draw_stability(found.rig, found.by_control)
 
 
-def _limit(limit: Limit) -> tuple[Cell, ...]:
-    own = "–" if limit.filed is None else f"{limit.filed:.3g}"
-    filed = Mark(f"{own} unstable", "bad") if limit.outside else own
-    if limit.simulated is None:
-        return limit.kind, limit.stable, f"({limit.least:.3g} to {limit.greatest:.3g})", "", filed
-    theory = "–" if limit.theory is None else f"{limit.theory:.4g}"
-    return limit.kind, limit.stable, f"{limit.simulated:.4g}", theory, filed
-
-
 def plan_report(found: ReadingsPlan, made: Made) -> Report:
     """Return the report of a plan: which readings to take, and what grids would give."""
-    d = unit_of(found.control)
-    heads = ("gradient set", "q̄, kPa", f"G_T, N/{d}", f"δ, {d}", "F, N", "times")
-    rows = tuple((*_station(station), str(count)) for station, count in found.chosen)
     sections = (
-        Section("Readings to take", (Table(heads, rows),)),
-        Section("Grids", (_grids(found),)),
+        Section("Readings to take", (plan_table(found),)),
+        Section("Grids", (grids_table(found),)),
     )
     count, half = found.reached.readings, found.reached.half_width
     said = f"{count} readings give K to ±{percent(half)} (95 %)."
@@ -109,33 +88,12 @@ def plan_report(found: ReadingsPlan, made: Made) -> Report:
     return Report("Plan", found.control, Verdict(said), sections, settings, made)
 
 
-def _station(one: Station) -> tuple[str, ...]:
-    numbers = (one.gradient, one.deflection, one.force)
-    return one.label, f"{one.pressure_Pa / 1000:.2f}", *(f"{number:.4g}" for number in numbers)
-
-
-def _grids(found: ReadingsPlan) -> Table:
-    sets, many = (sorted({size[i] for size in found.grids}) for i in (0, 1))
-    rows = tuple(
-        (str(few), *(percent(found.grids[few, n].half_width) for n in many)) for few in sets
-    )
-    caption = "K to ± (95 %), by gradient sets (rows) and deflections in each (columns)"
-    return Table(("", *map(str, many)), rows, caption)
-
-
 def readings_report(found: Readings, made: Made) -> Report:
     """Return the report of readings: a row each, and v₁ against the deflection."""
-    heads = ("row", "gradient set", "deflection, m or rad", "F, N", "v1, V", "v3, V")
     sections = (
-        Section("Readings", (Table(heads, tuple(_readings(found)), words=2),)),
+        Section("Readings", (readings_table(found),)),
         Section("Figure", (Drawing(svg_text(draw_taken(found)), _TAKEN),)),
     )
     said = repr(found).removeprefix("Readings(").removesuffix(")") + "."
     settings = (("readings", str(len(found.row))),)
     return Report("Readings", "Readings", Verdict(said), sections, settings, made)
-
-
-def _readings(found: Readings) -> Iterator[tuple[str, ...]]:
-    for i, row in enumerate(found.row.tolist()):
-        numbers = (found.deflection[i], found.force[i], found.v1[i], found.v3[i])
-        yield str(row), found.label[i], *(f"{float(n):.4g}" for n in numbers)

@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from itertools import groupby
 
 from coupled.campaign.check import CheckResult
 from coupled.campaign.verdict import Verdict as Judged
-from coupled.campaign.verdict import figures, finding, wanted
+from coupled.campaign.verdict import finding
 from coupled.display import System
-from coupled.reports.page import Made, Mark, Report, Section, Table, Verdict, passed
-
-_HEADS = ("", "case", "expected of", "configuration", "found", "wanted", "margin")
+from coupled.reports.page import Made, Report, Section, Verdict
+from coupled.tables.campaign import verdict_tables
 
 
 def check_report(checked: CheckResult, made: Made, system: System = "si") -> Report:
-    """Return the report: a table a run, in a system's units; the verdict names what fails."""
+    """Return the report: a table for each case, in a system's units; the verdict names failures."""
     runs = list(dict.fromkeys(verdict.run for verdict in checked.verdicts))
     groups = groupby(checked.verdicts, key=lambda v: v.run)
-    sections = [Section(run, (_table(list(group), system),)) for run, group in groups]
+    sections = [Section(run, tuple(verdict_tables(list(group), system))) for run, group in groups]
     settings = (("runs", ", ".join(runs)),)
     title = ", ".join(runs) or "Expectations"
     return Report("Check", title, _verdict(checked, system), tuple(sections), settings, made)
@@ -36,17 +34,3 @@ def _remark(verdict: Judged, system: System) -> str:
     at = "" if verdict.at_s is None else f", at {verdict.at_s:.4g} s"
     why = f". Why: {verdict.why}" if verdict.why else ""
     return f"{where}: {finding(verdict, system)}{at}{why}"
-
-
-def _table(verdicts: Sequence[Judged], system: System) -> Table:
-    return Table(_HEADS, tuple(_row(verdict, system) for verdict in verdicts), words=4)
-
-
-def _row(verdict: Judged, system: System) -> tuple[str | Mark, ...]:
-    mark = passed(verdict.passed)
-    if verdict.value is None or verdict.margin is None:
-        what = f"{verdict.what}: {verdict.problem}"
-        return mark, verdict.case, what, verdict.configuration, "–", wanted(verdict, system), "–"
-    found, margin = figures(verdict, system)
-    numbers = (found, wanted(verdict, system), margin)
-    return mark, verdict.case, verdict.what, verdict.configuration, *numbers

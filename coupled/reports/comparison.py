@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from itertools import groupby
 
 from coupled.authority.compare import Flight
-from coupled.authority.figures import named, remarks, rows
+from coupled.authority.figures import cases_of, flown_once, named, remarks, tabulated
 from coupled.display import System
 from coupled.flight.manoeuvre import Manoeuvre
 from coupled.plots.flights import draw_comparison
 from coupled.plots.saving import svg_text
-from coupled.reports.page import Drawing, Made, Report, Section, Table, Verdict
+from coupled.reports.page import Drawing, Made, Report, Section, Verdict
+from coupled.tables.flights import comparison_table
 
 _SHOWN = (
     "Surface command, motion, force against true deflection, and what is lost. Gray: as specified."
@@ -22,15 +22,13 @@ _STEPS = "Steps of the modifying force from frame to frame, which the hand feels
 
 def comparison_report(flights: Sequence[Flight], made: Made, system: System = "si") -> Report:
     """Return the report: a table and a figure a case, or one of all where each is flown once."""
-    cases = [list(group) for _, group in groupby(flights, key=lambda f: f.outcome.case)]
-    once = len(cases) > 1 and all(len(case) == 1 for case in cases)
-    groups = [list(flights)] if once else cases
+    groups, once = tabulated(flights), flown_once(cases_of(flights))
     run = flights[0].manoeuvre
     sections = [
         Section(
             "All cases" if once else case[0].outcome.case,
             (
-                _table(case, once, system),
+                comparison_table(case, system),
                 Drawing(svg_text(draw_comparison(case, system)), shown),
             ),
             own_page=i > 0,
@@ -46,12 +44,6 @@ def comparison_report(flights: Sequence[Flight], made: Made, system: System = "s
         tuple(_settings(run)),
         made,
     )
-
-
-def _table(case: Sequence[Flight], by_case: bool, system: System) -> Table:
-    heads = [f.outcome.case if by_case else named(f) for f in case]
-    body = tuple((label, *cells) for label, cells in rows(case, system))
-    return Table(("", *heads), body)
 
 
 def _verdict(flights: Sequence[Flight], system: System) -> Verdict:
@@ -96,7 +88,7 @@ def _settings(run: Manoeuvre) -> Iterable[tuple[str, str]]:
     yield "rig", rig.name
     yield "aircraft", rig.flight.model if rig.flight is not None else "none, on the bench"
     yield "control", run.control
-    pilots = (f"{type(p).__name__} on the {control}" for control, p in run.pilots.items())
+    pilots = (f"{p.title} on the {control}" for control, p in run.pilots.items())
     yield "pilot", ", ".join(pilots)
     yield "length of a flight", f"{run.duration_s:g} s"
     yield "frame rate", f"{rig.frame_rate:g} Hz, {rig.substeps} substeps of the rig a frame"

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
-from coupled.calibration.checks import ControlCheck
 from coupled.calibration.documentation import Documentation
 from coupled.calibration.qualification import FeelTest, Issue, check_numbers, cover_rows, feel_tests
 from coupled.calibration.reasons import reasons
 from coupled.calibration.result import CalibrationResult
-from coupled.display import System, pressure_in, pressure_shown
+from coupled.display import System, pressure_in
 from coupled.plots.checks import draw_releases, draw_static_checks
 from coupled.plots.documentation import draw_deflections, draw_forces
 from coupled.plots.readings import draw_readings
@@ -21,17 +20,15 @@ from coupled.reports.page import (
     Cover,
     Drawing,
     Made,
-    Mark,
     Report,
     Section,
-    Table,
     Verdict,
-    passed,
 )
+from coupled.tables.calibration import check_heads, check_row, checks_table
+from coupled.tables.table import Table
 from coupled.version import __version__
 
 _SIGNED = ("Prepared", "Checked", "Accepted")
-_RESULTS = ("", "rig", "reference", "± allowed", "unit", "margin", "result")
 _NAMED = 8  # checks that fail, on the first page
 Fits = Mapping[ControlName, tuple[CalibrationResult, str] | None]
 
@@ -90,26 +87,13 @@ def _verdict(tests: Sequence[FeelTest], system: System) -> Verdict:
 
 def _checks(tests: Sequence[FeelTest], system: System) -> Table:
     """Return the table of all checks, each with its test and the number of its figure."""
-    heads = (
-        "test",
-        "control",
-        "check",
-        f"q̄, {pressure_shown(system).unit}",
-        *_RESULTS[1:],
-        "figure",
+    rows = tuple(
+        (test.number, test.control, *check_row(check, system), str(number))
+        for number, test in enumerate(tests, 1)
+        for check in test.checks
     )
-    rows: list[tuple[str | Mark, ...]] = []
-    for number, test in enumerate(tests, 1):
-        for check in test.checks:
-            name, *result = _result(check, system)
-            pressure = pressure_in(check.pressure_Pa, system).partition(" ")[0]
-            rows.append((test.number, test.control, name, pressure, *result, str(number)))
-    return Table(heads, tuple(rows), words=3)
-
-
-def _result(check: ControlCheck, system: System) -> tuple[str | Mark, ...]:
-    margin = f"{100 * check.margin:.0f} %"
-    return check.name, *check_numbers(check, system), margin, passed(check.passed)
+    heads = ("test", "control", "check", *check_heads(system), "figure")
+    return Table(heads, rows, align="lllrrrrlrlr")
 
 
 def _test(found: Documentation, test: FeelTest, system: System) -> Section:
@@ -118,11 +102,10 @@ def _test(found: Documentation, test: FeelTest, system: System) -> Section:
     draw = draw_static_checks if test.kind == "static" else draw_releases
     place = pressure_in(test.condition.pressure_Pa, system)
     caption = f"{test.number}: {test.title}, q̄ = {place}."
-    results = Table(_RESULTS, tuple(_result(check, system) for check in test.checks))
     blocks = (
-        Table(("conditions", ""), test.conditions, words=2),
-        Table(("tolerances", ""), test.tolerances, words=2),
-        results,
+        Table(("conditions", ""), test.conditions, align="l"),
+        Table(("tolerances", ""), test.tolerances, align="l"),
+        checks_table("", test.checks, system),
         Drawing(svg_text(draw(alone, system)), caption),
     )
     return Section(f"{test.number}: {test.title}", blocks, own_page=True)

@@ -11,47 +11,17 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
-from typing import ClassVar, Literal
+from typing import ClassVar
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
 from coupled.errors import printable
 from coupled.reports.inline import inline_svg
+from coupled.tables.table import Table, Tone
 
 _MINUS = re.compile(r"(?<![\w.)-])-(?=\d)")
 _UNIT = re.compile(r"(?<=\d) (?=(%|N|m|mm|cm|s|ms|Hz|kPa|Pa|V|kt|lb|in|ft|°)\b|%|°)")
-Tone = Literal["good", "bad", "plain"]
-
-
-@dataclass(frozen=True)
-class Mark:
-    """A cell that says whether something is well."""
-
-    text: str
-    tone: Tone
-
-
-Cell = str | Mark
-
-
-def passed(good: bool) -> Mark:
-    """Return the cell of a check."""
-    return Mark("pass", "good") if good else Mark("FAIL", "bad")
-
-
-@dataclass(frozen=True)
-class Table:
-    """A table: a head a column, units in the heads or in the first cell of a row.
-
-    The first `words` columns are words, and stand at the left; numbers stand at the right.
-    """
-
-    kind: ClassVar[str] = "table"
-    heads: tuple[str, ...]
-    rows: tuple[tuple[Cell, ...], ...]
-    caption: str = ""
-    words: int = 1
 
 
 @dataclass(frozen=True)

@@ -5,15 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 from coupled.authority.compare import Flight
-from coupled.authority.figures import named, remarks, rows
+from coupled.authority.figures import named, remarks
 from coupled.display import percent
-from coupled.gap.findings.summary import figure
 from coupled.gap.nominalfit import NominalFit
 from coupled.plots.fits import draw_fit
 from coupled.plots.histories import Figure, draw_record
 from coupled.plots.saving import svg_text
 from coupled.record.record import Record
-from coupled.reports.page import Drawing, Made, Report, Section, Table, Text, Verdict
+from coupled.reports.page import Drawing, Made, Report, Section, Text, Verdict
+from coupled.tables.flights import comparison_table, record_table
+from coupled.tables.gaps import channels_table, numbers_table
 
 _HISTORY = "The record over time."
 _FITTED = "Each number as found over as filed, with its 95 % interval."
@@ -21,11 +22,9 @@ _FITTED = "Each number as found over as filed, with its 95 % interval."
 
 def record_report(record: Record, made: Made) -> Report:
     """Return the report of a record: its time histories, and the range of each channel."""
-    columns = zip(record.channels, record.data.T, strict=True)
-    table = Table(("channel", "least", "mean", "greatest"), tuple(map(_range, columns)))
     sections = (
         Section("Time histories", (Drawing(svg_text(draw_record(record)), _HISTORY),)),
-        Section("Channels", (table,)),
+        Section("Channels", (record_table(record),)),
     )
     ended = record.ended_early
     said = repr(record).removeprefix("Record(").removesuffix(")")
@@ -34,17 +33,9 @@ def record_report(record: Record, made: Made) -> Report:
     return Report("Record", "Record", verdict, sections, (("rows", str(len(record))),), made)
 
 
-def _range(column: tuple[str, np.ndarray]) -> tuple[str, ...]:
-    name, values = column
-    there = values[np.isfinite(values)]
-    if not there.size:
-        return name, "–", "–", "–"
-    return name, *(f"{float(each):.4g}" for each in (there.min(), there.mean(), there.max()))
-
-
 def flight_report(flight: Flight, made: Made) -> Report:
     """Return the report of one flight: its figures, and its time histories."""
-    table = Table(("", named(flight)), tuple((label, *cells) for label, cells in rows([flight])))
+    table = comparison_table([flight])
     history = Drawing(svg_text(draw_flight(flight)), _HISTORY)
     sections = (Section("Figures", (table,)), Section("Time histories", (history,)))
     loss, run = flight.outcome.loss, flight.manoeuvre
@@ -69,22 +60,10 @@ def draw_flight(flight: Flight) -> Figure:
 
 def fit_report(found: NominalFit, made: Made) -> Report:
     """Return the report of a fitted rig: its numbers, and how far each channel stays off."""
-    numbers = []
-    for one in found.numbers:
-        ends = "not determined"
-        if one.interval is not None:
-            ends = " to ".join(figure(end) for end in one.interval)
-        numbers.append((one.key, figure(one.filed), figure(one.found), ends))
-    channels = tuple(
-        (one.channel, *(f"{n:.3g}" for n in (one.before, one.after, one.floor, one.moves)))
-        for one in found.channels
-    )
-    heads = ("channel", "as filed", "fitted", "noise alone", "it moves by")
-    caption = "The rms distance on stretches of the records that the fit has not seen"
     sections = [
-        Section("Numbers", (Table(("number", "filed", "found", "95 % interval"), tuple(numbers)),)),
+        Section("Numbers", (numbers_table(found.numbers),)),
         Section("Fit", (Drawing(svg_text(draw_fit(found)), _FITTED),)),
-        Section("Channels", (Table(heads, channels, caption),)),
+        Section("Channels", (channels_table(found.channels),)),
     ]
     lines = [f"Not distinguished: {one.words}." for one in found.alike]
     lines += [f"Not determined: {key}." for key in found.unknown]

@@ -10,12 +10,15 @@ from coupled.exporting.write import Export
 from coupled.plots.rigs import draw_rig
 from coupled.plots.saving import svg_text
 from coupled.record.channels import unit_of
-from coupled.reports.page import Drawing, Made, Mark, Report, Section, Table, Text, Verdict
+from coupled.reports.page import Drawing, Made, Report, Section, Text, Verdict
 from coupled.rig.equations import uncompensated_loss
 from coupled.rig.parameters import Control
 from coupled.rig.rig import Rig
-from coupled.surveying.survey import Surveyed
+from coupled.surveying.terms import ModelTerms
 from coupled.surveying.whole import Survey
+from coupled.tables.flights import export_table
+from coupled.tables.rigs import models_table, terms_table
+from coupled.tables.table import Table
 
 _SHOWN = "G_T over q̄, and the share that the bend takes where the host corrects nothing."
 
@@ -28,10 +31,8 @@ def rig_report(rig: Rig, made: Made) -> Report:
         heads,
         tuple((rows[0][0], *(value for _, value in rows)) for rows in zip(*columns, strict=True)),
     )
-    sections = (
-        Section("Controls", (table,)),
-        Section("Gradients", (Drawing(svg_text(draw_rig(rig)), _SHOWN),)),
-    )
+    drawn = (Drawing(svg_text(draw_rig(rig)), _SHOWN),) if rig.controls else ()
+    sections = (Section("Controls", (table,)), Section("Gradients", drawn)) if drawn else ()
     aircraft = "none" if rig.flight is None else rig.flight.model
     settings = (
         ("rig", rig.name),
@@ -63,11 +64,7 @@ def _numbers(name: str, control: Control) -> Iterator[tuple[str, str]]:
 
 def survey_report(found: Survey, made: Made) -> Report:
     """Return the report of JSBSim's models: a row each."""
-    table = Table(
-        ("model", "trims at", "controls", "rigs"),
-        tuple(_surveyed(one) for one in found),
-        words=4,
-    )
+    table = models_table(found.models)
     trimmed = [one for one in found if one.flight is not None]
     led = sum(bool(one.controls) for one in trimmed)
     said = f"{len(trimmed)} of {len(found)} trim, {led} can be flown by a rig."
@@ -75,28 +72,17 @@ def survey_report(found: Survey, made: Made) -> Report:
     return Report("Models", "JSBSim", Verdict(said), (Section("Models", (table,)),), settings, made)
 
 
-def _surveyed(one: Surveyed) -> tuple[str | Mark, ...]:
-    if one.flight is None:
-        return one.model, Mark(f"no: {one.why}", "bad"), "", ", ".join(one.rigs)
-    held = "" if one.holds else ", does not hold"
-    speed, height = one.flight.calibrated_airspeed, one.flight.altitude
-    controls = ", ".join(one.controls) or "none"
-    controls += "" if one.direct or not one.controls else " (by a law or lag)"
-    return one.model, f"{speed:g} m/s, {height:g} m{held}", controls, ", ".join(one.rigs)
+def terms_report(found: ModelTerms, made: Made) -> Report:
+    """Return the report of a model's terms: a row each."""
+    said = f"{len(found)} named functions; shares in {found.flown}."
+    settings = (("model", found.model),)
+    section = Section("Terms", (terms_table(found),))
+    return Report("Terms", found.model, Verdict(said), (section,), settings, made)
 
 
 def export_report(found: Export, made: Made) -> Report:
     """Return the report of an export: how far each flight by JSBSim alone is from our own."""
-    rows = tuple(
-        (
-            *(one.run, f"{one.case}, {one.configuration}"),
-            *(f"{100 * x:.3f} %" for x in (one.deflection, one.force, one.modifying_force)),
-            "–" if one.loss is None else f"{100 * one.loss:+.3f}",
-        )
-        for one in found.beside
-    )
-    heads = ("run", "case", "deflection, of travel", "force", "F_mod", "lost, points")
-    sections = [Section("Flights by JSBSim alone, off our own by", (Table(heads, rows, words=2),))]
+    sections = [Section("Flights by JSBSim alone", (export_table(found),))]
     lines = [f"Left out: {line}" for line in found.left]
     lines += [f"By the scripts only: {line}" for line in found.scripted]
     if lines:

@@ -11,13 +11,14 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Callable
+from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, TypeVar, cast, get_type_hints
 
 import numba
 import numpy as np
-from llvmlite import ir
+from llvmlite import binding, ir
 from numba import types
 from numba.core import config
 from numba.core.caching import FunctionCache
@@ -25,6 +26,8 @@ from numba.core.registry import CPUDispatcher
 from numba.core.runtime import rtsys
 from numba.extending import intrinsic
 
+from coupled.errors import InputError
+from coupled.files import write_whole
 from coupled.timing import timed
 
 # A smaller state of a decay is at rest; subnormal numbers would slow the processor.
@@ -151,6 +154,43 @@ def machine_code(kernel: Any, *arguments: Any) -> int:
     compiled = kernel.overloads[tuple(_type_of(argument) for argument in arguments)]
     name = compiled.fndesc.llvm_cfunc_wrapper_name
     return int(compiled.library.get_pointer_to_function(name))
+
+
+def object_code(function: Callable[..., Any], name: str, *arguments: Any) -> bytes:
+    """Return a function as an object file for a linker, cached on disk.
+
+    It is position-independent code for any processor of this platform, needs no Python, and calls
+    the mathematics of the C library only, if the function allocates nothing. The symbol `name`
+    follows numba's convention: `int32_t name(RESULT *, void **error, ...)`, 0 without an error,
+    with `int64_t` and `double` for arguments like those given. All other symbols are local.
+    """
+    folder = _folder_of_version(config.CACHE_DIR, Path(function.__code__.co_filename).parent)
+    file = folder / f"{name}-{numba.__version__}-{binding.get_default_triple()}.o"
+    if file.is_file():
+        return file.read_bytes()
+    options = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+    dispatcher = numba.njit(function, **options)
+    kinds = tuple(_type_of(argument) for argument in arguments)
+    with timed("kernels"):
+        dispatcher.compile(kinds)
+        compiled = dispatcher.overloads[kinds]
+        code = _object_code(compiled.library, compiled.fndesc.mangled_name, name)
+    with suppress(InputError):  # a folder that cannot be written
+        write_whole(file, lambda part: part.write_bytes(code))
+    return code
+
+
+def _object_code(library: Any, mangled: str, name: str) -> bytes:
+    module = binding.parse_assembly(library.get_llvm_str())
+    for each in (*module.functions, *module.global_variables):
+        if not each.is_declaration:
+            each.linkage = "internal"
+    function = module.get_function(mangled)
+    function.linkage, function.visibility, function.name = "external", "hidden", name
+    module.verify()
+    target = binding.Target.from_default_triple()
+    machine = target.create_target_machine(opt=2, reloc="pic", codemodel="default")
+    return bytes(machine.emit_object(module))
 
 
 def _type_of(argument: Any) -> Any:

@@ -14,7 +14,7 @@ from coupled.rig.compensation import estimate, misses
 from coupled.rig.compiled import entry, seldom, stage
 from coupled.rig.control import ControlArray, ControlParameters, ControlState
 from coupled.rig.gauge import start_gauge
-from coupled.rig.hand import only_scripted
+from coupled.rig.hand import is_scripted
 from coupled.rig.inertia import set_inertia
 from coupled.rig.joining import bend_by_others, leak_from_others
 from coupled.rig.linkage import deflection, start_bend, transducer
@@ -29,7 +29,7 @@ from coupled.rig.modification import (
 from coupled.rig.reach import free, stop_again
 from coupled.rig.schedule import gradients, read_pressure
 from coupled.rig.sensing import converted, read_computed, read_force
-from coupled.rig.services import asked_of_surface, begin_services, note_services
+from coupled.rig.services import begin_services, commanded_deflection, note_services
 from coupled.rig.surface import command_surface
 
 Floats = NDArray[np.float64]
@@ -108,8 +108,10 @@ def host_frame(
         bent = estimate(p.compensation, computed_read, force_read)
         host.estimated = bent + s.crossing.estimated
     estimated = host.estimated
-    asked = asked_of_surface(p.services, s.services, estimated) if s.services.on else estimated
-    command = command_surface(p.surface, s.surface, asked, pressure)
+    commanded = (
+        commanded_deflection(p.services, s.services, estimated) if s.services.on else estimated
+    )
+    command = command_surface(p.surface, s.surface, commanded, pressure)
 
     out[0] = force_read
     out[1] = computed_read
@@ -172,7 +174,7 @@ def run_joined(controls: ControlArray, script: Floats, k: int, load_factor: floa
             p, s = controls[i].parameters, controls[i].state
             bend_by_others(controls, i)
             leak_from_others(controls, i, script, node)
-            scripted = only_scripted(p.hand) and p.reach.reach == 0.0
+            scripted = is_scripted(p.hand) and p.reach.reach == 0.0
             run_node(p, s, script[i, 0], script[i, 1], begun, node, scripted)
     settle_others(controls)
 
@@ -240,6 +242,17 @@ def host_frames(
     return first_command, second_command, third_command
 
 
+@stage
+def run_loaders(controls: ControlArray, script: Floats, k: int, load_factor: float) -> None:
+    """Run hand, loader and linkage of all controls over frame k, after its host."""
+    if controls[0].parameters.crossing.joined != 0:
+        run_joined(controls, script, k, load_factor)
+        return
+    for i in range(len(controls)):
+        p, s = controls[i].parameters, controls[i].state
+        run_frame(p, s, script[i, 0], script[i, 1], k * p.clock.substeps, load_factor)
+
+
 @entry
 def step_frame(
     controls: ControlArray,
@@ -262,10 +275,5 @@ def step_frame(
         start_controls(controls, script)
     serve_frame(controls, motion, load_factor)
     commands = host_frames(controls, record[k], motion)
-    if controls[0].parameters.crossing.joined != 0:
-        run_joined(controls, script, k, load_factor)
-        return commands
-    for i in range(len(controls)):
-        p, s = controls[i].parameters, controls[i].state
-        run_frame(p, s, script[i, 0], script[i, 1], k * p.clock.substeps, load_factor)
+    run_loaders(controls, script, k, load_factor)
     return commands

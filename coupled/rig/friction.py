@@ -95,7 +95,7 @@ FRICTION = Declaration(
 
 
 @stage
-def kept_at(p: FrictionParameters, rate: float) -> float:
+def stribeck_factor(p: FrictionParameters, rate: float) -> float:
     """Return the factor at `rate` in d/s of parts that fade with speed."""
     ratio = rate / p.stribeck_rate
     return math.exp(-ratio * ratio) if abs(ratio) < FADED else 0.0
@@ -106,11 +106,11 @@ def running_friction(p: FrictionParameters, rate: float) -> float:
     """Return the friction's size in N when sliding at `rate` in d/s."""
     if p.breakaway <= p.running:
         return p.running
-    return p.running + (p.breakaway - p.running) * kept_at(p, rate)
+    return p.running + (p.breakaway - p.running) * stribeck_factor(p, rate)
 
 
 @stage
-def more_friction(p: FrictionParameters, load: float, direction: float) -> float:
+def added_friction(p: FrictionParameters, load: float, direction: float) -> float:
     """Return the additions to friction by direction of motion and by load (N), N."""
     if p.varies == 0:
         return 0.0
@@ -119,8 +119,8 @@ def more_friction(p: FrictionParameters, load: float, direction: float) -> float
 
 @stage
 def _slipping(p: FrictionParameters, load: float, rate: float, kept: float) -> float:
-    """Return the friction at which bristles slip at a rate, N; `kept` is `kept_at` of the rate."""
-    level = p.running + (p.breakaway - p.running) * kept + more_friction(p, load, rate)
+    """Return the friction at which bristles slip, N; `kept` is `stribeck_factor` at the rate."""
+    level = p.running + (p.breakaway - p.running) * kept + added_friction(p, load, rate)
     return max(level, LEAST_N)  # breakaway alone fades to nothing with speed
 
 
@@ -179,15 +179,17 @@ def _bending(level: float, compliance: float, per_soft: float, bent: float, way:
 
 
 @stage
-def bent_after(p: FrictionParameters, bent: float, rate: float, way: float, load: float) -> float:
+def deflect_bristles(
+    p: FrictionParameters, bent: float, rate: float, way: float, load: float
+) -> float:
     """Return the bristles' deflection after a displacement at a rate, d; 0 for a rigid contact."""
     if p.stiffness == 0.0:
         return 0.0
-    return yielded(p, _slipping(p, load, rate, kept_at(p, rate)), bent, way)[0]
+    return yielded(p, _slipping(p, load, rate, stribeck_factor(p, rate)), bent, way)[0]
 
 
 @seldom
-def yielding_speed(
+def presliding_speed(
     p: FrictionParameters,
     bent: float,
     v: float,
@@ -205,7 +207,7 @@ def yielding_speed(
     from the solution with the initial slope, converges to u from one side.
     """
     stiffness, compliance, share = p.stiffness, p.compliance, p.elastic_share
-    level = _slipping(p, load, v, kept_at(p, v) if p.breakaway > p.running else 0.0)
+    level = _slipping(p, load, v, stribeck_factor(p, v) if p.breakaway > p.running else 0.0)
     free = inertia * v + push - stiffness * bent
     side = 1.0 if free > 0.0 else -1.0
     faded = FADED * p.stribeck_rate
@@ -220,7 +222,7 @@ def yielding_speed(
     u, last, after = free / (inertia + bends * (spring + p.contact_damping)), 0.0, bent
     per_span = 1.0 / span
     for _ in range(NEWTON_STEPS):
-        kept = kept_at(p, u)
+        kept = stribeck_factor(p, u)
         level, damping = _slipping(p, load, u, kept), p.contact_damping * kept
         per_soft = stiffness / ((1.0 - share) * level)
         way = u * span
@@ -250,7 +252,7 @@ def yielding_speed(
 
 
 @stage
-def rubbing_speed(
+def sliding_speed(
     p: FrictionParameters,
     bent: float,
     v: float,
@@ -270,8 +272,8 @@ def rubbing_speed(
     if p.dry == 0:
         return v + push / inertia, 0.0
     if p.stiffness > 0.0:
-        return yielding_speed(p, bent, v, push, inertia, span, load)
-    push -= more_friction(p, load, direction) * direction
+        return presliding_speed(p, bent, v, push, inertia, span, load)
+    push -= added_friction(p, load, direction) * direction
     halfway = v + (push - running_friction(p, v) * direction) / inertia
     if p.breakaway > p.running:  # Stribeck: a second iteration with the speed just found
         halfway = v + (push - running_friction(p, halfway) * direction) / inertia

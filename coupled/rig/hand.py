@@ -48,7 +48,7 @@ class HandState(Protocol):
     """The current action of the hand."""
 
     force: float  # N, pull positive
-    asked: float  # N, before the stop at the reach takes its part
+    commanded: float  # N, before the stop at the reach takes its part
     command: float  # u, N, held over the frame
     muscle: float  # u behind the muscle's lag, N
     integral: float  # the integral term, N
@@ -76,13 +76,13 @@ def has_impedance(p: HandParameters) -> bool:
 
 
 @stage
-def only_scripted(p: HandParameters) -> bool:
+def is_scripted(p: HandParameters) -> bool:
     """Tell whether a hand applies its script unchanged: no impedance, no limit."""
     return not has_impedance(p) and p.strongest == 0.0
 
 
 @stage
-def within_strength(p: HandParameters, s: HandState, force: float) -> float:
+def limit_to_strength(p: HandParameters, s: HandState, force: float) -> float:
     """Return a force limited to the hand's strength, N."""
     if p.strongest == 0.0:
         return force
@@ -91,7 +91,7 @@ def within_strength(p: HandParameters, s: HandState, force: float) -> float:
 
 
 @stage
-def ask(
+def command_force(
     p: HandParameters,
     s: HandState,
     linkage_p: LinkageParameters,
@@ -107,19 +107,19 @@ def ask(
     """
     wanted = script + s.muscle
     if not has_impedance(p):
-        s.asked = within_strength(p, s, wanted)
+        s.commanded = limit_to_strength(p, s, wanted)
         return 0.0
     slope, at = bend_slope(linkage_p, s.force), deflection(linkage_p, linkage, s.force)
     error = held - at
     rate_error = held_rate - linkage.rate
-    asked = wanted + p.stiffness * error + p.damping * rate_error + s.integral
+    commanded = wanted + p.stiffness * error + p.damping * rate_error + s.integral
     implicit = p.stiffness + p.damping / h
     if p.mass > 0.0:
-        asked -= p.mass * ((at - s.at) / h - s.moving) / h
+        commanded -= p.mass * ((at - s.at) / h - s.moving) / h
         implicit += p.mass / (h * h)
-    change = (asked - s.force) / (1.0 + slope * implicit)
+    change = (commanded - s.force) / (1.0 + slope * implicit)
     striving = p.integral * h * (error - slope * change)
-    s.asked = within_strength(p, s, s.force + change)
+    s.commanded = limit_to_strength(p, s, s.force + change)
     return striving
 
 

@@ -37,7 +37,7 @@ from coupled.rig.compiled import entry, stage
 from coupled.rig.control import ControlParameters
 from coupled.rig.events import sign
 from coupled.rig.frame import set_product
-from coupled.rig.friction import bent_after, more_friction, running_friction
+from coupled.rig.friction import added_friction, deflect_bristles, running_friction
 from coupled.rig.inertia import set_inertia
 from coupled.rig.loader import LoaderState, set_external, start_loader
 from coupled.rig.modification import set_gradients
@@ -46,7 +46,7 @@ from coupled.rig.packing import pack
 from coupled.rig.recorder import stamped
 from coupled.rig.replay import bent_by
 from coupled.rig.rig import Rig
-from coupled.rig.springs import elastic, feel, relax
+from coupled.rig.springs import apply_modification, elastic, relax
 
 Floats = NDArray[np.float64]
 RIGID = 1e-4  # of the travel, presliding of a rigid contact here
@@ -84,11 +84,11 @@ def answer_to(
     p, s = packed["parameters"].copy(), packed["state"].copy()
     frames, h = len(gradient), 1.0 / (rig.frame_rate * rig.substeps)
     level = np.ones(frames) if load_factor is None else load_factor
-    felt, mass = np.zeros((6, len(nodes))), np.zeros(frames)
-    _answer(p, s, nodes, np.stack((gradient, level)), rig.substeps, h, felt, mass)
+    answer, mass = np.zeros((6, len(nodes))), np.zeros(frames)
+    _answer(p, s, nodes, np.stack((gradient, level)), rig.substeps, h, answer, mass)
     # Of the substep that ends at node n: force without inertia, mean speed, whether in contact, by
     # how much friction at rest may hold less and more, and the side to which it slips.
-    force, speed, touched, less, more, slips = felt
+    force, speed, touched, less, more, slips = answer
     half, last = max(1, rig.substeps // 2), len(nodes) - 1
     at = np.arange(frames) * rig.substeps
     before, after = np.clip(at - half + 1, 1, last - 1), np.clip(at + half, 2, last)
@@ -106,10 +106,10 @@ def answer_to(
     )
 
 
-def _sampled(felt: Floats, at: NDArray[np.intp]) -> Floats:
+def _sampled(answer: Floats, at: NDArray[np.intp]) -> Floats:
     """Return the mean of the substeps before and after each frame."""
-    last = len(felt) - 1
-    return np.asarray(0.5 * (felt[np.maximum(at, 1)] + felt[np.minimum(at + 1, last)]))
+    last = len(answer) - 1
+    return np.asarray(0.5 * (answer[np.maximum(at, 1)] + answer[np.minimum(at + 1, last)]))
 
 
 def _at_rest(way: Floats, rate_Hz: float, yields: float) -> NDArray[np.bool_]:
@@ -178,11 +178,11 @@ def _rubbing(p: ControlParameters, loader: LoaderState, dry: float, way: float, 
     """Return the friction over a displacement in h seconds, N, and advance its contact."""
     rate = way / h
     if p.friction.stiffness > 0.0:
-        loader.bent = bent_after(p.friction, loader.bent, rate, way, loader.load)
+        loader.bent = deflect_bristles(p.friction, loader.bent, rate, way, loader.load)
         return p.friction.stiffness * loader.bent
     if p.friction.dry == 0:
         return 0.0
-    most = running_friction(p.friction, rate) + more_friction(p.friction, loader.load, rate)
+    most = running_friction(p.friction, rate) + added_friction(p.friction, loader.load, rate)
     return min(max(dry + most * way / (RIGID * p.loader.travel), -most), most)
 
 
@@ -194,7 +194,7 @@ def _answer(
     given: Floats,
     substeps: int,
     h: float,
-    felt: Floats,
+    answer: Floats,
     mass: Floats,
 ) -> None:
     """Write force without inertia, N, speed, contact, friction's range and slip of each substep.
@@ -213,26 +213,26 @@ def _answer(
         mass[k] = loader.mass
         for node in range(k * substeps + 1, min((k + 1) * substeps + 1, len(nodes))):
             if p.loader.held:
-                feel(p.loader, m, loader, loader.computed)
-                feel(p.loader, m, loader, loader.computed)
+                apply_modification(p.loader, m, loader, loader.computed)
+                apply_modification(p.loader, m, loader, loader.computed)
             held = elastic(p.loader, m, loader, loader.computed) + loader.relaxed - loader.external
             alone = loader.computed if half == 0.0 else _left_alone(p, loader, held, h)
             new = min(max(alone, nodes[node] - half), nodes[node] + half)
-            way, loader.load = new - loader.computed, abs(felt[0, node - 1] + loader.external)
+            way, loader.load = new - loader.computed, abs(answer[0, node - 1] + loader.external)
             dry = _rubbing(p, loader, dry, way, h)
             if p.loader.relaxing > 0.0:
                 relax(p.loader, loader, way, h)
             loader.computed = new
-            felt[1, node] = way / h
+            answer[1, node] = way / h
             if half == 0.0 or new != alone:  # else there is no contact
                 breakout = p.loader.breakout + (0.0 if p.loader.held else m.breakout)
-                felt[2, node] = 1.0
+                answer[2, node] = 1.0
                 force = elastic(p.loader, m, loader, new) + loader.relaxed - loader.external
-                felt[0, node] = force + loader.damping * way / h + dry + breakout * sign(new)
+                answer[0, node] = force + loader.damping * way / h + dry + breakout * sign(new)
                 if p.friction.rigid:
                     holds = running_friction(p.friction, 0.0)
-                    felt[3, node] = holds + more_friction(p.friction, loader.load, -1.0) + dry
-                    felt[4, node] = holds + more_friction(p.friction, loader.load, 1.0) - dry
+                    answer[3, node] = holds + added_friction(p.friction, loader.load, -1.0) + dry
+                    answer[4, node] = holds + added_friction(p.friction, loader.load, 1.0) - dry
                     slips = running_friction(p.friction, way / h)
-                    slips += more_friction(p.friction, loader.load, way / h)
-                    felt[5, node] = sign(dry) if abs(dry) >= slips else 0.0
+                    slips += added_friction(p.friction, loader.load, way / h)
+                    answer[5, node] = sign(dry) if abs(dry) >= slips else 0.0

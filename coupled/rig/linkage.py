@@ -71,7 +71,7 @@ class LinkageState(CommandState, Protocol):
     touch: float  # z, the grip relative to the servo with a soft contact, d
     bent: float  # y, d
     bent_rate: float  # y', d/s
-    asked: float  # the input of the mode, the static bend at the last node, d
+    mode_input: float  # the input of the mode, the static bend at the last node, d
     others: float  # bend by the other controls' forces, d
 
 
@@ -215,7 +215,7 @@ def static_slope(p: LinkageParameters, force: float) -> float:
 
 
 @stage
-def pressed(p: LinkageParameters, force: float) -> float:
+def contact_displacement(p: LinkageParameters, force: float) -> float:
     """Return the displacement of the grip from the servo by a force in N in a soft backlash, d.
 
     At rest: half of the play, and the deflection of its contact, sgn(F)·play/2 + F/k; 0 for a rigid
@@ -231,27 +231,27 @@ def start_bend(p: LinkageParameters, s: LinkageState, force: float) -> None:
     """Start at rest under the force at the first node, N."""
     half = 0.5 * p.width
     s.carried = min(max(s.carried, force - half), force + half)
-    s.asked = s.bent = still(p, s, force)
+    s.mode_input = s.bent = still(p, s, force)
 
 
 @stage
-def carry(p: LinkageParameters, s: LinkageState, force: float, h: float) -> None:
+def advance_memory(p: LinkageParameters, s: LinkageState, force: float, h: float) -> None:
     """Advance the parts with a memory of the force to a node, h seconds after the last; N."""
     if p.contact > 0.0:
-        _press(p, s, force, h)
+        _move_in_backlash(p, s, force, h)
     half = 0.5 * p.width
     s.carried = min(max(s.carried, force - half), force + half)
     if p.modal:
         a, b, y, v = p.mode_position, p.mode_speed, s.bent, s.bent_rate
-        before, s.asked = s.asked, still(p, s, force)
-        s.bent = a[0] * y + a[1] * v + a[2] * before + a[3] * s.asked
-        s.bent_rate = b[0] * y + b[1] * v + b[2] * before + b[3] * s.asked
+        before, s.mode_input = s.mode_input, still(p, s, force)
+        s.bent = a[0] * y + a[1] * v + a[2] * before + a[3] * s.mode_input
+        s.bent_rate = b[0] * y + b[1] * v + b[2] * before + b[3] * s.mode_input
         if abs(s.bent) < TINY and abs(s.bent_rate) < TINY:
             s.bent = s.bent_rate = 0.0
 
 
 @stage
-def _press(p: LinkageParameters, s: LinkageState, force: float, h: float) -> None:
+def _move_in_backlash(p: LinkageParameters, s: LinkageState, force: float, h: float) -> None:
     """Move the grip in its backlash by the force, N, until the contact holds it."""
     half, z = 0.5 * p.play, s.touch
     yields = force / p.contact

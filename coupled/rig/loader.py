@@ -29,17 +29,17 @@ from coupled.rig.compiled import TINY, layout, stage
 from coupled.rig.declaration import Declaration, Ends
 from coupled.rig.delay import DelayParameters, DelayState, delayed, start_delay
 from coupled.rig.events import NOTHING, REST, STOP, first_event, sign
-from coupled.rig.friction import FrictionParameters, bent_after, more_friction, rubbing_speed
+from coupled.rig.friction import FrictionParameters, added_friction, deflect_bristles, sliding_speed
 from coupled.rig.modification import ModificationState
 from coupled.rig.parameters import DELAY_SLOTS
 from coupled.rig.springs import (
     DERIVED,
     SpringParameters,
     SpringState,
+    apply_modification,
     elastic,
-    faded,
-    feel,
     relax,
+    relaxed_after,
     relaxing_mean,
     stiffness,
 )
@@ -139,8 +139,8 @@ def _holds(friction: FrictionParameters, s: LoaderState, breakout: float) -> End
     preload = breakout if s.computed == s.neutral else 0.0
     if friction.rigid == 0:
         return -preload, preload
-    down = friction.breakaway + more_friction(friction, s.load, -1.0) + preload
-    return -down, friction.breakaway + more_friction(friction, s.load, 1.0) + preload
+    down = friction.breakaway + added_friction(friction, s.load, -1.0) + preload
+    return -down, friction.breakaway + added_friction(friction, s.load, 1.0) + preload
 
 
 @stage
@@ -166,7 +166,7 @@ def _midpoint(
         kept, damping = relaxing_mean(p, s, span)
         inertia += damping
         push -= kept + damping * v
-    return rubbing_speed(friction, s.bent, v, push, direction, inertia, span, s.load)
+    return sliding_speed(friction, s.bent, v, push, direction, inertia, span, s.load)
 
 
 @stage
@@ -189,12 +189,12 @@ def _rest(
     balance -= friction.stiffness * s.bent
     start, end = pulls[0] + balance, pulls[1] + balance
     if p.relaxing > 0.0:
-        start, end = start - s.relaxed, end - faded(p, s, left)
+        start, end = start - s.relaxed, end - relaxed_after(p, s, left)
     holds = _holds(friction, s, breakout)
     share, direction = _release(p, s, holds, start, end, ends)
     still = (share if direction != 0.0 else 1.0) * left
     if p.relaxing > 0.0:
-        s.relaxed = faded(p, s, still)
+        s.relaxed = relaxed_after(p, s, still)
     return still, direction
 
 
@@ -212,7 +212,7 @@ def _pass_neutral(
     s.computed = s.neutral
     hold = breakout
     if friction.rigid:
-        hold += friction.running + more_friction(friction, s.load, s.rate)
+        hold += friction.running + added_friction(friction, s.load, s.rate)
     pull -= friction.stiffness * s.bent + s.relaxed
     surplus = hold - abs(pull - elastic(p, m, s, 0.0))
     if s.mass * abs(s.rate) <= left * surplus:
@@ -271,7 +271,9 @@ def _move(
         s.computed = x + span * (v + 0.5 * acceleration * span)
         s.rate = v + acceleration * span
         way = s.computed - x
-        s.bent = bent if event == NOTHING else bent_after(friction, s.bent, halfway, way, s.load)
+        s.bent = (
+            bent if event == NOTHING else deflect_bristles(friction, s.bent, halfway, way, s.load)
+        )
         if p.relaxing > 0.0:
             relax(p, s, s.computed - x, span)
         if event == NOTHING:
@@ -300,7 +302,7 @@ def move_loader(
 ) -> None:
     """Advance δc within `ends` over h seconds, at whose end the pilot's force is `force` N."""
     if p.held:
-        feel(p, m, s, s.computed - s.neutral)
+        apply_modification(p, m, s, s.computed - s.neutral)
     _move(p, friction, m, s, force + s.leaked, ends, h)
     if p.lag_gain > 0.0:
-        feel(p, m, s, s.computed - s.neutral)
+        apply_modification(p, m, s, s.computed - s.neutral)

@@ -13,12 +13,12 @@ from coupled.rig.command import take_set_point
 from coupled.rig.compiled import seldom, stage
 from coupled.rig.control import ControlParameters, ControlState
 from coupled.rig.gauge import gauge_force, move_gauge
-from coupled.rig.hand import ask, hold, move_muscle, only_scripted
+from coupled.rig.hand import command_force, hold, is_scripted, move_muscle
 from coupled.rig.inertia import lead_force
-from coupled.rig.linkage import carry, move_linkage
+from coupled.rig.linkage import advance_memory, move_linkage
 from coupled.rig.loader import move_loader, set_external
 from coupled.rig.modification import exchange_last
-from coupled.rig.reach import bounds, seated, set_reach, stop_grip, stop_linkage, within_reach
+from coupled.rig.reach import bounds, set_reach, side_at_stop, stop_grip, stop_linkage, within_reach
 from coupled.rig.sensing import sample
 from coupled.rig.services import serve, set_base
 
@@ -31,12 +31,12 @@ def set_hand(
 ) -> None:
     """Set the hand's force at a node from its script, N, and held deflection, d, with its rate."""
     h = p.clock.substep
-    striving = ask(p.hand, s.hand, p.linkage, s.linkage, script, held, held_rate, h)
-    force = s.hand.asked
+    striving = command_force(p.hand, s.hand, p.linkage, s.linkage, script, held, held_rate, h)
+    force = s.hand.commanded
     if p.reach.reach > 0.0:
         computed = s.loader.computed
         force = within_reach(p.reach, s.reach, p.linkage, s.linkage, computed, force)
-        if force != s.hand.asked:
+        if force != s.hand.commanded:
             striving = 0.0  # no integral windup at the stop
     hold(p.hand, s.hand, p.linkage, s.linkage, force, striving, h)
 
@@ -72,7 +72,7 @@ def begin_frame(p: ControlParameters, s: ControlState, load_factor: float) -> bo
         sample_channels(p, s, p.clock.substeps, True)
     if p.modification.late > 0:
         exchange_last(s.modification)
-    return only_scripted(p.hand) and not stopped
+    return is_scripted(p.hand) and not stopped
 
 
 @seldom
@@ -97,8 +97,8 @@ def run_node(
     # The hand's impedance is that of the last node; its script is that of this one.
     before = s.loader.computed
     acting = s.hand.force
-    if stopped and seated(s.reach, p.linkage, before) != 0:
-        acting = s.hand.asked  # before the stop takes its part
+    if stopped and side_at_stop(s.reach, p.linkage, before) != 0:
+        acting = s.hand.commanded  # before the stop takes its part
     ahead = acting + force[node] - force[node - 1]
     if p.gauge.present != 0 or p.inertia.rows > 0:
         ahead = force_given(p, s, ahead)
@@ -118,7 +118,7 @@ def run_node(
         rate = (held[node] - held[node - 1]) / h
         set_hand(p, s, force[node], held[node], rate)
     if p.linkage.carries:
-        carry(p.linkage, s.linkage, s.hand.force, h)
+        advance_memory(p.linkage, s.linkage, s.hand.force, h)
         if stopped:
             stop_grip(p.reach, p.linkage, s.linkage, s.hand.force)
     if p.sensing.skewed:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from typing import Annotated, Any, Literal
 
-from pydantic import PlainValidator
+from pydantic import Field, PlainValidator
 
 from coupled.schema import Section, derived, named, quantity, text_like
 
@@ -333,16 +333,31 @@ class Flight(Section):
     landing: bool = False
     steps_per_frame: int = quantity("", 1, ge=1, le=100)
     elevator_effectiveness: float = quantity("", 1.0, ge=0, le=10)
+    aileron_effectiveness: float = quantity("", 1.0, ge=0, le=10)
+    rudder_effectiveness: float = quantity("", 1.0, ge=0, le=10)
     pitch_damping: float = quantity("", 1.0, ge=0, le=10)
+    roll_damping: float = quantity("", 1.0, ge=0, le=10)
+    yaw_damping: float = quantity("", 1.0, ge=0, le=10)
     pitch_stiffness: float = quantity("", 1.0, ge=0, le=10)
+    dihedral_effect: float = quantity("", 1.0, ge=0, le=10)
+    directional_stability: float = quantity("", 1.0, ge=0, le=10)
+    adverse_yaw: float = quantity("", 1.0, ge=0, le=10)
     lift_slope: float = quantity("", 1.0, ge=0, le=10)
+    side_force_slope: float = quantity("", 1.0, ge=0, le=10)
+    drag: float = quantity("", 1.0, ge=0, le=10)
+    thrust: float = quantity("", 1.0, ge=0, le=10)
     mass: float = quantity("", 1.0, gt=0, le=10)
+    roll_inertia: float = quantity("", 1.0, gt=0, le=10)
+    pitch_inertia: float = quantity("", 1.0, gt=0, le=10)
+    yaw_inertia: float = quantity("", 1.0, gt=0, le=10)
     cg_aft: float = quantity("m", 0.0, ge=-5, le=5)
     fuel: float = quantity("", 1.0, ge=0, le=100)
     motion_stamp: float = quantity("s", 0.0, ge=-0.5, le=0.5)
     gust_rms: float = quantity("m_per_s", 0.0, ge=0, le=30)
+    lateral_gust_rms: float = quantity("m_per_s", 0.0, ge=0, le=30)
     gust_length: float = quantity("m", 150.0, gt=0)
     properties: dict[str, float] = {}
+    terms: dict[str, Annotated[float, Field(ge=0, le=10)]] = {}
     # By control, those of its section of the rig: they belong to the model.
     surfaces: dict[str, SurfaceProperties] = derived({})
 
@@ -351,3 +366,8 @@ class Flight(Section):
         """The model's main file, relative to the folder of all models."""
         file = self.model_file.removesuffix(".xml") or self.model
         return f"{self.model}/{file}.xml"
+
+    @property
+    def still(self) -> bool:
+        """Whether the rig has no gusts."""
+        return self.gust_rms == self.lateral_gust_rms == 0.0

@@ -31,13 +31,13 @@ from typing import Protocol
 
 from coupled.rig.compiled import layout, seldom, stage
 from coupled.rig.declaration import Declaration
-from coupled.rig.friction import FrictionParameters, more_friction
+from coupled.rig.friction import FrictionParameters, added_friction
 from coupled.rig.hand import HandState
 from coupled.rig.linkage import (
     LinkageParameters,
     LinkageState,
+    contact_displacement,
     deflection,
-    pressed,
     static_slope,
     still,
 )
@@ -75,7 +75,7 @@ REACH = Declaration(
 
 
 @stage
-def unbent(p: LinkageParameters, by: float) -> float:
+def force_for_bend(p: LinkageParameters, by: float) -> float:
     """Return the force in N for a bend of the structure, d: `bend` solved for F, K > 0."""
     compliance = p.bend if by >= 0.0 else p.push
     if compliance == 0.0:
@@ -102,14 +102,16 @@ def _place(
     """Return x and F_x on a side, both as sizes, by bracketed Newton's method."""
     low, high = 0.0, p.aft if side > 0.0 else p.forward
     x = min(r, high)
-    rubs = friction.running + more_friction(friction, 0.0, side)
+    rubs = friction.running + added_friction(friction, 0.0, side)
     level = p.breakout + m.breakout + rubs - side * s.external
     force = level
     for _ in range(_ITERATIONS):
         at = x - side * s.neutral
         force = level + side * spring(p, side * at) + limited(p, smooth_force(m, at))
         force /= 1.0 - friction.by_load
-        ahead = still(linkage_p, linkage, side * force) + pressed(linkage_p, side * force)
+        ahead = still(linkage_p, linkage, side * force) + contact_displacement(
+            linkage_p, side * force
+        )
         over = x + side * (ahead + linkage.others) - r
         if over > 0.0:
             high = x
@@ -154,7 +156,7 @@ def set_reach(
 
 
 @stage
-def _dragged(p: LinkageParameters) -> float:
+def _servo_lead(p: LinkageParameters) -> float:
     """Return the servo's lead over the grip, d: half of a rigid backlash."""
     return 0.0 if p.contact > 0.0 else 0.5 * p.play
 
@@ -173,7 +175,7 @@ def bounds(
     """
     if p.reach == 0.0:
         return -loader_p.forward, loader_p.aft
-    half = _dragged(linkage_p)
+    half = _servo_lead(linkage_p)
     low = max(-loader_p.forward, min(stop.bottom - half, computed))
     return low, min(loader_p.aft, max(stop.top + half, computed))
 
@@ -183,7 +185,7 @@ def stop_linkage(
     stop: ReachState, p: LinkageParameters, s: LinkageState, position: float, grip: float
 ) -> None:
     """Stop servo and grip at the reach; `position` and `grip` are those before."""
-    half = _dragged(p)
+    half = _servo_lead(p)
     top, bottom = max(stop.top + half, position), min(stop.bottom - half, position)
     if s.position > top:
         s.position, s.rate = top, min(s.rate, 0.0)
@@ -196,16 +198,16 @@ def stop_linkage(
 
 
 @stage
-def seated(stop: ReachState, p: LinkageParameters, computed: float) -> int:
+def side_at_stop(stop: ReachState, p: LinkageParameters, computed: float) -> int:
     """Return the side on which δc is at its stop by the reach, or 0."""
-    half = _dragged(p)
+    half = _servo_lead(p)
     if abs(computed - (stop.top + half)) <= _SEAT * abs(computed):
         return 1
     return -1 if abs(computed - (stop.bottom - half)) <= _SEAT * abs(computed) else 0
 
 
 @seldom
-def _brought(p: LinkageParameters, s: LinkageState, by: float, side: float) -> float:
+def _force_for_displacement(p: LinkageParameters, s: LinkageState, by: float, side: float) -> float:
     """Return the largest force to a side, N, that displaces the grip by at most `by`, d.
 
     By bisection: bend, with its current hysteresis, and a soft backlash at rest grow with force.
@@ -214,13 +216,13 @@ def _brought(p: LinkageParameters, s: LinkageState, by: float, side: float) -> f
         widest = p.contact * (abs(by) + 0.5 * p.play)
         inner, outer = -side * widest, side * widest
     else:
-        middle, half = unbent(p, by), 0.5 * p.width
+        middle, half = force_for_bend(p, by), 0.5 * p.width
         if abs(middle) >= _NO_FORCE:
             return middle
         inner, outer = middle - side * half, middle + side * half
     for _ in range(_HALVINGS):
         force = 0.5 * (inner + outer)
-        if side * (still(p, s, force) + pressed(p, force) - by) > 0.0:
+        if side * (still(p, s, force) + contact_displacement(p, force) - by) > 0.0:
             outer = force
         else:
             inner = force
@@ -244,7 +246,7 @@ def _most(
         at, force = stop.top, stop.top_force
         if side < 0.0:
             at, force = stop.bottom, stop.bottom_force
-        if side * seated(stop, linkage_p, computed) <= 0.0 or side * at < p.reach:
+        if side * side_at_stop(stop, linkage_p, computed) <= 0.0 or side * at < p.reach:
             return side * _NO_FORCE
         return force
     servo = linkage.position if linkage_p.contact > 0.0 else linkage.grip
@@ -252,8 +254,8 @@ def _most(
     if side * by < 0.0 and inward == 0.0 and linkage_p.contact == 0.0:
         return 0.0  # it is beyond the reach, and no force bends it back
     if linkage_p.share > 0.0 or linkage_p.contact > 0.0:
-        return _brought(linkage_p, linkage, by, side)
-    return unbent(linkage_p, by)
+        return _force_for_displacement(linkage_p, linkage, by, side)
+    return force_for_bend(linkage_p, by)
 
 
 @stage

@@ -18,7 +18,7 @@ from coupled.rig.compiled import long_entry
 from coupled.rig.frame import set_product
 from coupled.rig.hosted import HOSTED, Hosted, Mask, held_over
 from coupled.rig.inertia import lead_force, set_inertia
-from coupled.rig.linkage import carry, deflection, move_linkage, start_bend, transducer
+from coupled.rig.linkage import advance_memory, deflection, move_linkage, start_bend, transducer
 from coupled.rig.loader import move_loader, set_external, start_loader
 from coupled.rig.modification import assume, assumed_bend, set_gradients
 from coupled.rig.nodes import on_nodes
@@ -343,7 +343,7 @@ def _linkage(
                 move_linkage(p, s, computed[node], computed[node + 1], h)
                 if p.carries:
                     share = (node + 1 - k * substeps) / substeps
-                    carry(p, s, force[k] + share * (force[k + 1] - force[k]), h)
+                    advance_memory(p, s, force[k] + share * (force[k + 1] - force[k]), h)
     return out
 
 
@@ -364,7 +364,7 @@ def _bent(
         out[k] = deflection(p, s, force[k])
         if k + 1 < len(force) and p.carries:
             for node in range(1, substeps + 1):
-                carry(p, s, force[k] + node / substeps * (force[k + 1] - force[k]), h)
+                advance_memory(p, s, force[k] + node / substeps * (force[k + 1] - force[k]), h)
     return out
 
 

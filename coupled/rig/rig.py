@@ -83,7 +83,8 @@ class Rig(RigData, Result):
 
     def __repr__(self) -> str:
         aircraft = "no aircraft" if self.flight is None else self.flight.model
-        return f"Rig({self.name}: {', '.join(self.controls)} at {self.frame_rate:g} Hz; {aircraft})"
+        controls = ", ".join(self.controls) or "no control"
+        return f"Rig({self.name}: {controls} at {self.frame_rate:g} Hz; {aircraft})"
 
     def __getitem__(self, key: str) -> Any:
         """Return a value, or a whole section, by its dotted key in a rig file.
@@ -209,6 +210,8 @@ def _control(rig: Rig, name: str, given: Any) -> Control:
 
 def checked(rig: Rig, file: object) -> Rig:
     """Return the rig; raises InputError with `file` for a physically impossible one."""
+    if not rig.controls and rig.flight is None:
+        raise InputError(file, "controls", "a rig needs a control or an aircraft ([flight])")
     for name, control in rig.controls.items():
         _check_control(rig, name, control, file)
     check_structure(rig.structure, {str(n): c for n, c in rig.controls.items()}, file)

@@ -6,6 +6,7 @@ from typing import Self
 
 from pydantic import model_validator
 
+from coupled.errors import InputError
 from coupled.record.channels import ControlName
 from coupled.rig.parameters import Control, Flight, PlainName, SurfaceProperties
 from coupled.rig.structure import Structure
@@ -32,3 +33,9 @@ class RigData(Section):
             if own != self.flight.surfaces:
                 self.__dict__["flight"] = self.flight.model_copy(update={"surfaces": own})
         return self
+
+    def check_controlled(self, file: object = None) -> None:
+        """Refuse a rig without a control; `file` is named in the fault, by default the rig."""
+        if not self.controls:
+            problem = "the rig has an aircraft only; give a rig with a control ([controls.column])"
+            raise InputError(file or self.name, "controls", problem)

@@ -65,9 +65,9 @@ def rig_from_table(table: Mapping[str, Any], file: object) -> Rig:
     faults: list[InputError] = []
     with collected(faults):
         known_keys(table, known, file, "")
-    controls = table.get("controls")
-    if not isinstance(controls, dict) or not controls:
-        problem = f"needs at least one of {', '.join(CONTROL_NAMES)}"
+    controls = table.get("controls", {})
+    if not isinstance(controls, dict) or not (controls or "flight" in table):
+        problem = f"needs at least one of {', '.join(CONTROL_NAMES)}, or the file a [flight]"
         raise together([*faults, InputError(file, "controls", problem)])
     with collected(faults):
         known_keys(controls, dict.fromkeys(CONTROL_NAMES), file, "controls")

@@ -22,6 +22,7 @@ def rig_text(rig: RigData, remark: str = "") -> str:
     if rig.flight is not None:
         lines += ["", "[flight]", *_values(rig.flight, "m")]
         lines += _mapping("flight.properties", rig.flight.properties)
+        lines += _mapping("flight.terms", rig.flight.terms)
     lines += _mapping("noise", rig.noise)
     lines += _table("structure", rig.structure, "m")
     for name, control in rig.controls.items():

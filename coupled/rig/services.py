@@ -296,7 +296,7 @@ def serve(
 
 
 @stage
-def asked_of_surface(p: ServicesParameters, s: ServicesState, estimated: float) -> float:
+def commanded_deflection(p: ServicesParameters, s: ServicesState, estimated: float) -> float:
     """Return the command of the surface, d, for the host's estimate δ̂."""
     own = s.held if s.stuck else estimated
     s.asked = own

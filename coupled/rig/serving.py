@@ -1,7 +1,8 @@
 """Commands of the loaders' services in flight, for a run's events and for a page.
 
-`lead` sets a service of a flying rig, packed by `pack`, between two frames; `noted` returns the
-kernels' last values of the services, by the channels of `service_channels`.
+`set_service` sets a service of a flying rig, packed by `pack`, between two frames;
+`copy_service_rows` copies the kernels' last values of the services, by the channels of
+`service_channels`.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from coupled.rig.surface import share_of_travel
 Floats = NDArray[np.float64]
 
 # The commands of a control: their place in the state, and their largest value, if any is set.
-LED: dict[str, tuple[str, str, float | None]] = {
+SERVICES: dict[str, tuple[str, str, float | None]] = {
     "trim_{d}": ("loader", "neutral", None),
     "trim_release": ("services", "trim_release", 1.0),
     "autopilot": ("services", "autopilot", 1.0),
@@ -50,8 +51,8 @@ _NEEDS = {
 
 
 def services_of(control: str) -> dict[str, str]:
-    """Return {service of a control, with its unit: its key in `LED`}."""
-    return {key.format(d=unit_of(control)): key for key in LED}
+    """Return {service of a control, with its unit: its key in `SERVICES`}."""
+    return {key.format(d=unit_of(control)): key for key in SERVICES}
 
 
 def service_channels(control: str) -> tuple[str, ...]:
@@ -112,7 +113,9 @@ def has_services(control: Control) -> bool:
     return control.services != Services()
 
 
-def check_led(rig: Rig, control: str, service: str, to: float, file: object, place: str) -> None:
+def check_service(
+    rig: Rig, control: str, service: str, to: float, file: object, place: str
+) -> None:
     """Raise InputError for a command impossible on a rig; `place` is the table of a file."""
     if control not in rig.controls:
         problem = f"the rig has no {control}; {nearest(control, rig.controls)}"
@@ -126,7 +129,7 @@ def check_led(rig: Rig, control: str, service: str, to: float, file: object, pla
     if needed and getattr(data.services, needed) == 0.0:
         problem = f"does nothing without controls.{control}.services.{key} of the rig"
         raise InputError(file, f"{place}.service", problem)
-    most = LED[known[service]][2]
+    most = SERVICES[known[service]][2]
     if most is not None and not 0.0 <= to <= most:
         raise InputError(file, f"{place}.to", f"is {to:g}; a share or a switch, from 0 to 1")
     if known[service].endswith("_{d}") and abs(to) > data.travel:
@@ -134,7 +137,7 @@ def check_led(rig: Rig, control: str, service: str, to: float, file: object, pla
         raise InputError(file, f"{place}.to", problem)
 
 
-def lead(
+def set_service(
     controls: ControlArray, names: Sequence[str], control: str, service: str, value: float
 ) -> None:
     """Set a service of a flying rig between two frames; `names` are its controls, in order.
@@ -142,20 +145,24 @@ def lead(
     An engaged autopilot holds the control at its position, until another is set.
     """
     state = controls["state"][list(names).index(control)]
-    stage, field, _ = LED[services_of(control)[service]]
+    stage, field, _ = SERVICES[services_of(control)[service]]
     if field == "autopilot" and value > 0.5 >= state["services"]["autopilot"]:
         state["services"]["autopilot_at"] = state["loader"]["computed"]
     state[stage][field] = value
     state["services"]["on"] = 1
 
 
-def led(controls: ControlArray, names: Sequence[str], control: str, service: str) -> float:
+def service_command(
+    controls: ControlArray, names: Sequence[str], control: str, service: str
+) -> float:
     """Return the current command of a service of a flying rig."""
-    stage, field, _ = LED[services_of(control)[service]]
+    stage, field, _ = SERVICES[services_of(control)[service]]
     return float(controls["state"][list(names).index(control)][stage][field])
 
 
-def noted(controls: ControlArray, names: Sequence[str], which: Sequence[str], into: Floats) -> None:
+def copy_service_rows(
+    controls: ControlArray, names: Sequence[str], which: Sequence[str], into: Floats
+) -> None:
     """Write the last values of some controls' services, a row each, shape (n, channels)."""
     rows = controls["state"]["services"]["row"]
     for row, name in zip(into, which, strict=True):

@@ -40,7 +40,7 @@ class SpringParameters(Protocol):
 class SpringState(Protocol):
     """The state of the springs."""
 
-    felt: float  # F_mod on the loader if it is held, N
+    applied: float  # F_mod on the loader if it is held, N
     relaxed: float  # y, N
 
 
@@ -95,7 +95,7 @@ def limited(p: SpringParameters, force: float) -> float:
 def elastic(p: SpringParameters, m: ModificationState, s: SpringState, x: float) -> float:
     """Return the smooth part of the force against δc = x, N: the springs', and F_mod."""
     force = spring(p, x)
-    return force + (s.felt if p.held else limited(p, smooth_force(m, x)))
+    return force + (s.applied if p.held else limited(p, smooth_force(m, x)))
 
 
 @stage
@@ -108,17 +108,19 @@ def stiffness(p: SpringParameters, m: ModificationState, x: float) -> float:
 
 
 @stage
-def feel(p: SpringParameters, m: ModificationState, s: SpringState, computed: float) -> None:
+def apply_modification(
+    p: SpringParameters, m: ModificationState, s: SpringState, computed: float
+) -> None:
     """Apply a held F_mod to the loader: at once, or advanced by half a substep through its lag."""
     wanted = m.held if p.digital else modifying_force(m, computed)
     wanted = limited(p, wanted)
     if p.lag_gain > 0.0:
-        wanted = s.felt + p.lag_gain * (wanted - s.felt)
-    s.felt = wanted
+        wanted = s.applied + p.lag_gain * (wanted - s.applied)
+    s.applied = wanted
 
 
 @stage
-def faded(p: SpringParameters, s: SpringState, span: float) -> float:
+def relaxed_after(p: SpringParameters, s: SpringState, span: float) -> float:
     """Return the relaxing spring's force after `span` seconds at rest, N."""
     return s.relaxed * math.exp(-span / p.relaxing_time)
 

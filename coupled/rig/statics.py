@@ -33,14 +33,14 @@ from coupled.rig.compiled import entry, seldom, stage
 from coupled.rig.control import ControlArray, ControlParameters, ControlState
 from coupled.rig.crossing import leaks
 from coupled.rig.equations import basic_force, specified_force
-from coupled.rig.linkage import LinkageParameters, bend, pressed
+from coupled.rig.linkage import LinkageParameters, bend, contact_displacement
 from coupled.rig.modification import set_gradients, smooth_force
 from coupled.rig.packing import crossed_bends, pack
 from coupled.rig.rig import Rig
 from coupled.rig.schedule import gradients
 from coupled.rig.sensing import converted, scale_at
 from coupled.rig.springs import limited, ripple
-from coupled.rig.surface import asked_command
+from coupled.rig.surface import static_command
 
 Floats = NDArray[np.float64]
 loader_force = stage(basic_force)  # eq. (8)
@@ -197,7 +197,7 @@ def _force(
 @stage
 def _yields(p: LinkageParameters, force: float) -> float:
     """Return the displacement of the grip from δc under a force in N, d."""
-    return bend(p, force) + pressed(p, force)
+    return bend(p, force) + contact_displacement(p, force)
 
 
 @entry
@@ -233,7 +233,7 @@ def _made_of(
         force_read = p.sensing.force_scale * force[i] + p.sensing.force_zero
         made = estimate(p.compensation, read * computed[i], force_read) + beside[1]
         out[1, i] = made
-        out[2, i] = asked_command(p.surface, made, pressure) + p.surface.offset
+        out[2, i] = static_command(p.surface, made, pressure) + p.surface.offset
 
 
 @seldom

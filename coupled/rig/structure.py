@@ -84,7 +84,7 @@ def lost_deflections(compliance: Floats, gradients: Floats, deflections: Floats)
     return np.asarray(compliance @ (gradients * deflections))
 
 
-def felt_forces(compliance: Floats, on_computed: Floats, deflections: Floats) -> Floats:
+def hand_forces(compliance: Floats, on_computed: Floats, deflections: Floats) -> Floats:
     """Return F in N if each loader holds F_i = g_i·δc_i: (1 + g·K)⁻¹·g·δ.
 
     `on_computed` is g in N/d, `deflections` δ in d; the whole `compliance` in d/N.

@@ -66,11 +66,11 @@ def share_of_travel(control: Control, deflection: NDArray[np.float64]) -> NDArra
 
 
 @stage
-def asked_command(p: SurfaceParameters, estimate: float, dynamic_pressure: float) -> float:
+def static_command(p: SurfaceParameters, estimate: float, dynamic_pressure: float) -> float:
     """Return the linkage's command, in ±1, for δ̂ in d and q̄ in Pa."""
     gain = p.gain if estimate > 0.0 else p.gain_push
-    asked = min(max(gain * estimate, -1.0), 1.0)
-    return asked / (1.0 + p.stretch * dynamic_pressure)
+    commanded = min(max(gain * estimate, -1.0), 1.0)
+    return commanded / (1.0 + p.stretch * dynamic_pressure)
 
 
 @stage
@@ -78,8 +78,8 @@ def command_surface(
     p: SurfaceParameters, s: SurfaceState, estimate: float, dynamic_pressure: float
 ) -> float:
     """Return the command over this frame, in ±1, for δ̂ in d and q̄ in Pa."""
-    asked = asked_command(p, estimate, dynamic_pressure)
-    s.lagged += p.lag_gain * (asked - s.lagged)
+    commanded = static_command(p, estimate, dynamic_pressure)
+    s.lagged += p.lag_gain * (commanded - s.lagged)
     if abs(s.lagged) < TINY:
         s.lagged = 0.0
     if p.rate_step > 0.0:

@@ -83,13 +83,16 @@ def kind_of(mass_kg: float) -> Kind:
     return next(kind for kind in _KINDS if mass_kg <= kind.most_kg)
 
 
-def draft(found: Surveyed, name: str, folder: str = "") -> str:
+def draft(found: Surveyed, name: str, folder: str = "", airframe_only: bool = False) -> str:
     """Return the text of a first rig file for a surveyed model that trims.
 
     `folder` is the folder of models of a user's own model, relative to the rig file.
+    `airframe_only` leaves out the controls.
     """
-    flight = found.flight
-    assert flight is not None
+    if airframe_only:
+        head = [f"# {found.model}: an aircraft without controls, written by `coupled new rig`."]
+        head += ["", f'name = "{name}"', "frame_rate_Hz = 120.0"]
+        return "\n".join([*head, *_flight(found, folder), ""])
     kind = kind_of(found.mass_kg)
     said = f"its empty mass of {found.mass_kg:,.0f} kg" if found.mass_kg else "no mass in its file"
     lines = [
@@ -117,10 +120,12 @@ def _flight(found: Surveyed, folder: str) -> list[str]:
     if flight.model_file:
         lines.append(f"model_file = {json.dumps(flight.model_file)}")
     lines.append(f"altitude_m = {flight.altitude:g}               # it trims here, and {holds}")
-    lines.append(
-        f"calibrated_airspeed_m_per_s = {flight.calibrated_airspeed:g}"
-        f"  # it trims and answers from {found.slowest:g} to {found.fastest:g} m/s, as tried"
-    )
+    speed = f"calibrated_airspeed_m_per_s = {flight.calibrated_airspeed:g}"
+    if found.slowest < found.fastest:
+        speed += (
+            f"  # it trims and answers from {found.slowest:g} to {found.fastest:g} m/s, as tried"
+        )
+    lines.append(speed)
     if not found.direct:
         lines.append("direct_controls = false         # a law or lag of the model's own is between")
     if flight.properties:

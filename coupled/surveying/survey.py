@@ -23,7 +23,7 @@ from coupled.files import read_bytes
 from coupled.flight.aircraft import make_aircraft
 from coupled.flight.airframe import packaged_models
 from coupled.flight.direct import check_direct_controls
-from coupled.flight.modelfile import UnreadableModelError, parsed
+from coupled.flight.modeltext import UnreadableModelError, parsed
 from coupled.record.channels import CONTROL_NAMES, PITCH, ROLL, ControlName
 from coupled.resources import aircraft_folder, shipped_rigs
 from coupled.rig.parameters import Flight
@@ -145,7 +145,7 @@ def _models_of(word: str, known: Mapping[str, Path]) -> list[ModelFile]:
     try:
         path = Path(word).resolve()
         if path.is_file() and path.suffix == ".xml":
-            return [_model_file(path)]
+            return [model_file(path)]
         found = _models_in(path) or [each for f in sorted(path.iterdir()) for each in _models_in(f)]
     except (OSError, ValueError):  # no folder, or no name that one can have
         found = []
@@ -160,10 +160,11 @@ def _models_in(folder: Path) -> list[ModelFile]:
     if not folder.is_dir():
         return []
     files = sorted(folder.glob("*.xml"), key=lambda file: (file.stem != folder.name, file.name))
-    return [_model_file(f) for f in files if f.stem == folder.name or _is_main(f)]
+    return [model_file(f) for f in files if f.stem == folder.name or _is_main(f)]
 
 
-def _model_file(path: Path) -> ModelFile:
+def model_file(path: Path) -> ModelFile:
+    """Return the model of a main file."""
     folder = path.parent
     return ModelFile(folder.parent, folder.name, "" if path.stem == folder.name else path.stem)
 
@@ -221,6 +222,19 @@ def survey(model: ModelFile, *, speeds: bool = False) -> Surveyed:
         *(model.label, flight, holds, "", controls, direct, lacking),
         *(slowest, fastest, mass, rigs),
     )
+
+
+def surveyed(word: str, model: ModelFile, airframe_only: bool = False) -> Surveyed:
+    """Return what is found of a model for a first rig; `word` names it in faults.
+
+    Raises InputError if it does not trim or, unless `airframe_only`, has no control for a rig.
+    """
+    found = survey(model, speeds=not airframe_only)
+    if found.flight is None:
+        raise InputError(word, "", f"does not trim wherever it was tried: {found.why}")
+    if not found.controls and not airframe_only:
+        raise InputError(word, "", f"has no control that a rig could move: {found.lacking[0]}")
+    return found
 
 
 def _tries(model: ModelFile) -> Iterator[Flight]:

@@ -20,7 +20,7 @@ from coupled.flight.manoeuvre import Manoeuvre
 from tests.support.rigs import bench
 
 SLOW = {"AuthorityMap", "Diagnosis", "Export", "ForceDocument", "NominalFit", "Stability", "Survey"}
-SLOW |= {"CalibrationResult", "Comparison", "Flight", "Readings"}
+SLOW |= {"ModelTerms", "CalibrationResult", "Comparison", "Flight", "Readings"}
 SWEEP = {
     "name": "bends",
     "run": "appendix-c",
@@ -55,6 +55,7 @@ def made(name: str, folder: Path) -> Any:
         "Stability": lambda: coupled.stability("bench"),
         "ForceDocument": lambda: coupled.document("bench"),
         "Survey": lambda: coupled.models(["T37", "L17"]),
+        "ModelTerms": lambda: coupled.terms("T37"),
         "Export": lambda: coupled.export("t37", folder / "export", runs=[]),
     }
     return ways[name]()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from coupled.authority.held import held_forces
+from coupled.authority.held import average_held_forces
 from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import Manoeuvre, configure
 from coupled.flight.pilot import PILOTS
@@ -24,6 +24,6 @@ def test_a_bob_weight_is_no_part_of_the_felt_gradient() -> None:
     manoeuvre = Manoeuvre(rigid, {"column": clamp}, 2.0)
     record = fly(manoeuvre)
     assert np.max(record["load_factor"]) > 1.3
-    felt, specified = held_forces(manoeuvre, "column", record)
+    felt, specified = average_held_forces(manoeuvre, "column", record)
     assert felt == pytest.approx(specified, rel=0.03)
     assert 60.0 * (np.mean(record["load_factor"]) - 1.0) > 0.1 * specified

@@ -11,16 +11,22 @@ are the same, and the wall seconds of both stand side by side.
 from __future__ import annotations
 
 import os
+import resource
 import time
+from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from coupled.gap.diagnose import diagnose
+from coupled.record.record import Record
 from tests.support import gaps
 from tests.support.benchmarks import keep
 
 pytestmark = pytest.mark.bench
+Floats = NDArray[np.float64]
 
 CASES: dict[str, dict[str, dict[str, float]]] = {
     "none": {},
@@ -45,6 +51,28 @@ CASES: dict[str, dict[str, dict[str, float]]] = {
 }
 
 
+def jams(grip_m: Floats) -> Floats:
+    """Return the motion of a grip that is held for 0.3 s every 4 s."""
+    frames = np.arange(len(grip_m))
+    held = frames - np.where(frames % 480 < 36, frames % 480, 0)
+    return np.asarray(grip_m[held])
+
+
+def dead_zone(grip_m: Floats) -> Floats:
+    """Return the motion that a transducer reads with a dead zone of 4 mm about neutral."""
+    return np.asarray(grip_m - np.clip(grip_m, -2e-3, 2e-3))
+
+
+OUTSIDE = {"an intermittent jam": jams, "a dead zone of the reading": dead_zone}
+
+
+def spoiled(record: Record, spoil: Callable[[Floats], Floats]) -> Record:
+    """Return a record whose grip moves, or is read, as no effect of the library has it."""
+    data, at = record.data.copy(), record.channels.index("column_deflection_m")
+    data[:, at] = spoil(data[:, at])
+    return Record(record.channels, data, record.manifest)
+
+
 def test_a_diagnosis_by_all_cores_is_that_of_one_and_its_seconds(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -67,4 +95,14 @@ def test_a_diagnosis_by_all_cores_is_that_of_one_and_its_seconds(
         print(f"{figures[f'{name}, processor_s by one']:.1f} s of a processor")
         assert answers[0] == answers[1]
         assert [effect["name"] for effect in answers[0]["effects"]] == list(values)
+    for name, spoil in OUTSIDE.items():
+        record = spoiled(gaps.made(tmp_path, nominal, {}, 31), spoil)
+        wall_s = time.perf_counter()
+        found = diagnose(nominal, {"r": record})
+        found.as_dict()
+        figures[f"{name}, wall_s by all"] = time.perf_counter() - wall_s
+        print(f"\n{name}: {figures[f'{name}, wall_s by all']:.1f} s by all cores")
+        assert found.verdict == "unexplained"
+    figures["peak_MB"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
+    print(f"\nat most {figures['peak_MB']:.0f} MB of memory")
     keep("diagnosis of 60 s", figures, load)

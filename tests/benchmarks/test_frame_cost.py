@@ -12,13 +12,16 @@ import resource
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+import coupled
 from coupled.flight.airframe import JSBSimAirframe
 from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import Manoeuvre
+from coupled.flight.pilot.own import GivenForce
 from coupled.resources import shipped_runs
 from tests.support.benchmarks import FRAME_BOUNDS, keep, kept_figures
 from tests.support.runs import shortened
@@ -67,6 +70,39 @@ def test_a_coupled_frame_costs_little_more_than_a_run(run: str, controls: int, m
     name = f"frame cost, {controls} control(s)"
     keep(name, {**kept_figures(name), run: ratio}, load)
     assert ratio <= most
+
+
+STEP_BOUND = 1.15  # times a frame of `fly`, with one control
+
+
+def stepped_s(scenario: Manoeuvre) -> float:
+    with coupled.Session(replace(scenario, pilots={"column": GivenForce()})) as session:
+        step = session.step
+        start = time.thread_time()
+        for _ in range(scenario.frames):
+            step(column_force_N=20.0)
+        return time.thread_time() - start
+
+
+@pytest.mark.parametrize("run", ["pull-up-c172p", "pull-up-737"])
+def test_a_step_of_a_session_costs_little_more_than_a_frame_of_fly(run: str) -> None:
+    load = os.getloadavg()[0]
+    long, short = shortened(run, 1, FRAMES), shortened(run, 1, 1)
+    flown_s(short)
+    stepped_s(short)
+    flown, start, stepped = [], [], []
+    ratio = STEP_BOUND + 1.0
+    for done in range(4 * ROUNDS):
+        if done >= ROUNDS and ratio <= STEP_BOUND:
+            break
+        flown.append(flown_s(long))
+        stepped.append(stepped_s(long))
+        start.append(flown_s(short))
+        ratio = min(stepped) / (min(flown) - min(start))
+    print(f"\n{run}: a step costs {ratio:.3f} times a frame of fly, bound {STEP_BOUND}")
+    name = "session step, 1 control"
+    keep(name, {**kept_figures(name), run: ratio}, load)
+    assert ratio <= STEP_BOUND
 
 
 def test_a_60_s_flight_and_its_record_fit_in_60_mb(tmp_path: object) -> None:

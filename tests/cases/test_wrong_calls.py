@@ -17,6 +17,7 @@ from coupled.arguments import MARK, hints_of
 from coupled.calibration.bench import CalibrationBench, take_readings
 from coupled.calibration.estimate import usual_instruments
 from coupled.calibration.plan import stations
+from coupled.envs import LoaderEnv
 from coupled.flight.pilot import PILOTS, Pilot
 from coupled.flight.pilot.base import Start
 from tests.support.rigs import bench
@@ -56,13 +57,50 @@ def calls() -> list[Call]:
     plan: dict[str, Any] = {"name": "s", "run": "appendix-c", "configurations": ["rigid"]}
     plan |= {"vary": [{"key": "rig.controls.column.loader.bend_m_per_N", "values": [0.0]}]}
     start = Start(100.0)
+    stepped: dict[str, Any] = {
+        key: flown[key] for key in ("what", "dynamic_pressure_Pa", "seed", "name")
+    }
+    stepped |= {"gradient": None, "wheel": None}
+    session = coupled.Session(**stepped)
+    options: dict[str, Any] = {
+        "controls": ["column"],
+        "force_limit_N": 10.0,
+        "observed": ["pitch_rad"],
+    }
+    options |= {"reward": None, "change_rad": 0.1, "frames": 1, "terms": {}}
+    env = LoaderEnv("report-column", **options)
     found: list[Call] = [
         ("load_rig", coupled.load_rig, {"rig": "t37"}),
         ("load_run", coupled.load_run, {"run": "appendix-c"}),
-        ("fly", coupled.fly, {**flown, "configuration": "rigid", "wheel": None, "pedals": None}),
+        (
+            "fly",
+            coupled.fly,
+            {**flown, "configuration": "rigid", "wheel": None, "pedals": None, "gradient": None},
+        ),
+        ("Session", coupled.Session, {**stepped, "configuration": "rigid", "column": PULL}),
+        ("Session.step", session.step, {"column_force_N": 1.0, "wheel_force_N": None}),
+        ("Session.reset", session.reset, {"seed": 1}),
+        (
+            "Session.set_switch",
+            session.set_switch,
+            {"control": "column", "switch": "friction", "value": 1.0},
+        ),
+        (
+            "Session.set_service",
+            session.set_service,
+            {"control": "column", "service": "jammed", "value": 1.0},
+        ),
+        ("Session.deflection_correction", partial(_corrected, session), {"on": True}),
+        ("State[…]", session.state.__getitem__, {"channel": "time_s"}),
+        ("LoaderEnv", LoaderEnv, {"rig": "report-column", **options}),
+        ("LoaderEnv.step", env.step, {"action": [0.1]}),
         ("compare", coupled.compare, {**flown, "configurations": ["rigid"]}),
-        ("check", coupled.check, {"runs": [[case]], "progress": None}),
-        ("sweep", coupled.sweep, {"plan": plan, "folder": None, "workers": 1, "cluster": ""}),
+        ("check", coupled.check, {"runs": [[case]], "progress": None, "column": None}),
+        (
+            "sweep",
+            coupled.sweep,
+            {"plan": plan, "folder": None, "workers": 1, "cluster": "", "column": None},
+        ),
         ("read_record", coupled.read_record, {"path": "record.csv"}),
         ("write_record", coupled.write_record, {"record": record, "path": "again.csv"}),
         ("import_log", coupled.import_log, {"log": "record.csv", "log_map": "m.toml", "rig": rig}),
@@ -113,6 +151,10 @@ def calls() -> list[Call]:
         found.append((f"{name}.reach", pilot.reach, {"control": "column"}))
         found.append((f"{name}.keys_on", pilot.keys_on, {"control": "column"}))
     return found
+
+
+def _corrected(session: coupled.Session, on: Any) -> None:
+    session.deflection_correction = on
 
 
 def _changed(rig: coupled.Rig, key: str, value: Any) -> Any:

@@ -17,6 +17,7 @@ from coupled.exporting.alone import fly_alone
 from coupled.exporting.beside import beside
 from coupled.exporting.write import DEFLECTION, FORCE, LOSS, Export, Flown, export, put
 from coupled.flight.airframe import packaged_models
+from coupled.flight.altered import ALTERATIONS
 from coupled.flight.manoeuvre import Manoeuvre
 from coupled.flight.pilot import Step
 from coupled.resources import shipped_rigs
@@ -120,6 +121,40 @@ def test_a_case_of_another_load_gets_it_by_its_script() -> None:
     ]
     for name in (b"aero-rp", b"contents-lbs"):
         assert [name in text for text in scripts] == [True, False]
+
+
+def test_every_exported_factor_flies_as_in_our_own_flight() -> None:
+    """Those from zero are in the model, those about the trim in the script; a term as well."""
+    factors = dict.fromkeys((a.part.name for a in ALTERATIONS), 0.8)
+    changes: dict[str, Any] = {f"flight.{name}": factor for name, factor in factors.items()}
+    changes["flight.terms"] = {"aero/coefficient/Clr": 0.5}
+    rig = shipped("t37", changes)
+    step = Step(force_N=10.0, start_s=0.5)
+    case = Manoeuvre(rig, {"column": step, "wheel": step, "pedals": step}, 2.0)
+    made = export(rig, [Flown(case, ("compensated",))], check=False)
+    main = made.files[PurePosixPath("aircraft/T37/T37.xml")]
+    for stated in (
+        '"0.5">coupled/terms/aero/coefficient/Clr/factor<',
+        f'"{0.8 - 1.0!r}">coupled/thrust/more<',
+        '"0.8">coupled/drag/factor<',
+    ):
+        assert f"<property value={stated}".encode() in main, stated
+    assert [line.partition(" = ")[0] for line in made.scripted if "effectiveness" in line] == [
+        f"flight.{surface}_effectiveness" for surface in ("elevator", "aileron", "rudder")
+    ]
+    ours, alone, said = both(case)
+    assert said == ""
+    plain, _, _ = both(replace(case, rig=shipped("t37")))
+    for name in ("roll_rate_rad_per_s", "yaw_rate_rad_per_s", "pitch_rate_rad_per_s"):
+        size = np.ptp(ours[name])
+        assert np.max(np.abs(alone[name] - ours[name])) < 0.02 * size, name
+        assert np.max(np.abs(plain[name] - ours[name])) > 0.05 * size, name
+
+
+@pytest.mark.parametrize("key", ["roll_inertia", "lateral_gust_rms_m_per_s"])
+def test_what_a_file_cannot_have_is_refused(key: str) -> None:
+    with pytest.raises(InputError, match=rf"flight\.{key}: .* not exported.*; leave it at "):
+        export(shipped("t37", {f"flight.{key}": 1.1}))
 
 
 @pytest.fixture

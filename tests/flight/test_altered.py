@@ -15,13 +15,15 @@ from coupled.errors import InputError
 from coupled.flight.aircraft import make_aircraft, make_unchecked
 from coupled.flight.airframe import JSBSimAirframe, packaged_models
 from coupled.flight.altered import ALTERATIONS
-from coupled.flight.modelfile import Scaled
+from coupled.flight.modelparts import Part, Term
+from coupled.flight.modeltext import functions_of
 from coupled.flight.wrapper import Wrapper
 from coupled.record.channels import ALPHA, ELEVATOR, LONGITUDINAL, PITCH, PITCH_RATE
 from coupled.resources import aircraft_folder, shipped_rigs
 from coupled.rig.parameters import Flight
 from coupled.rig.rigfile import read_rig
 from coupled.schema import changed
+from coupled.surveying.survey import chosen_model
 from tests.support.models import edited_model, multiplied
 
 FRAME = 1 / 120
@@ -46,18 +48,23 @@ def motions(airframe: JSBSimAirframe, size: float = 0.04, frames: int = 240) -> 
 
 
 class Neutral(Wrapper):
-    """All parts scalable, and none scaled."""
+    """All parts scalable that a model has, and a term, and none scaled."""
+
+    def __init__(self, model: str) -> None:
+        self._model = model
 
     @property
-    def scaled(self) -> tuple[Scaled, ...]:
-        return tuple(alteration.part for alteration in ALTERATIONS)
+    def scaled(self) -> tuple[Part, ...]:
+        parts = [alteration.part for alteration in ALTERATIONS]
+        term = next(iter(functions_of(chosen_model(self._model).path)))
+        return (Term(term), *(p for p in parts if (self._model, p.name) != ("737", "adverse_yaw")))
 
 
 @pytest.mark.parametrize("name", FLOWN)
 def test_a_model_that_is_scalable_and_not_scaled_is_as_filed_to_the_bit(name: str) -> None:
     flight, folders = shipped(name), [aircraft_folder()]
     plain = JSBSimAirframe(flight, FRAME, models=folders)
-    scalable = JSBSimAirframe(flight, FRAME, models=folders, wrappers=[Neutral()])
+    scalable = JSBSimAirframe(flight, FRAME, models=folders, wrappers=[Neutral(flight.model)])
     assert scalable.has("coupled/pitch_damping/factor")
     assert np.array_equal(motions(plain), motions(scalable))
 

@@ -130,7 +130,7 @@ def test_frames_in_blocks_end_where_the_height_is_not_a_number() -> None:
 class Onlooker:
     """A companion that does nothing; with it the flight runs frame by frame."""
 
-    elsewhere = leads = False
+    real_loader = sets_services = False
 
     def begin(self, access: FlightAccess) -> None:
         pass

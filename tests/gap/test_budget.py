@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from coupled.gap import diagnose as diagnosing
+from coupled.gap import prepare
 from coupled.gap.effects.effect import apply
 from coupled.gap.effects.library import BY_NAME, EFFECTS
 from coupled.gap.findings.budget import NOISE, UNEXPLAINED, _Blocks, _Weights
@@ -36,7 +37,7 @@ def shares(found: Diagnosis, stage: str) -> dict[str, float]:
 def without(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Take an effect out of the library: it is then one that the library lacks."""
     known = [e for e in EFFECTS if e.name != name]
-    monkeypatch.setattr(diagnosing, "library_of", lambda *_: known)
+    monkeypatch.setattr(prepare, "library_of", lambda *_: known)
 
 
 @pytest.mark.slow

@@ -8,12 +8,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from coupled.gap import prepare
 from coupled.gap.diagnose import diagnose
-from coupled.gap.effects.effect import Effect
 from coupled.gap.findings.changed import Comparison, Interval, compare
-from coupled.gap.refuted import search_unrefuted
-from coupled.gap.search.case import Case
-from coupled.gap.search.choose import Choice
 from coupled.gap.signals.output import Output
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points
@@ -133,18 +130,17 @@ def test_two_healthy_records_show_no_change_of_a_tenth() -> None:
     assert compared(WELL[:1], [screw(60, friction=3.0)]).changed == ()
 
 
-def without_effects(case: Case, library: Sequence[Effect]) -> tuple[Case, Choice]:
-    """Search no effect: what no effect of the library explains is named all the same."""
-    return search_unrefuted(case, ())
-
-
-def test_a_diagnosis_against_healthy_records_names_the_stage_that_changed() -> None:
+def test_a_diagnosis_against_healthy_records_names_the_stage_that_changed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """With an empty library: what no effect explains is named all the same."""
+    monkeypatch.setattr(prepare, "library_of", lambda rig, control: [])
     well = {f"well{i}": one for i, one in enumerate(WELL)}
-    rig, search = screw_rig(), without_effects
-    same = diagnose(rig, {"r": screw(70)}, healthy=well, search=search)
+    rig = screw_rig()
+    same = diagnose(rig, {"r": screw(70)}, healthy=well)
     assert same.verdict == "no_gap"
     assert "would have been shown" in same.summary
-    found = diagnose(rig, {"r": screw(71, friction=1.4)}, healthy=well, search=search)
+    found = diagnose(rig, {"r": screw(71, friction=1.4)}, healthy=well)
     assert found.verdict == "unexplained"
     assert found.guilty == ("loader",)
     assert found.as_dict()["healthy"]["changes"][0]["stage"] == "loader"
@@ -153,8 +149,11 @@ def test_a_diagnosis_against_healthy_records_names_the_stage_that_changed() -> N
     assert ", mean in" in found.summary
 
 
-def test_a_verdict_needs_healthy_records_that_would_show_a_change() -> None:
-    alone = diagnose(screw_rig(), {"r": screw(70)}, healthy={"w": WELL[0]}, search=without_effects)
+def test_a_verdict_needs_healthy_records_that_would_show_a_change(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(prepare, "library_of", lambda rig, control: [])
+    alone = diagnose(screw_rig(), {"r": screw(70)}, healthy={"w": WELL[0]})
     assert alone.verdict == "ambiguous"
     assert "cannot be decided" in alone.summary
     assert alone.as_dict()["healthy"]["shown"] == {"loader": None}

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from coupled.gap.diagnose import diagnose
 from coupled.gap.findings.onset import in_time
-from coupled.gap.search.course import Bounds, Course, course_of, course_of_events
-from coupled.gap.search.timed import Timing, timing_of
+from coupled.gap.search.course import Bounds, Course, Timing, course_of, course_of_events, timing_of
 from coupled.record.record import Record
 from tests.support.gaps import LONG_s, made, nominal_rig
 

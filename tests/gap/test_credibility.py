@@ -28,6 +28,7 @@ from coupled.gap.findings.credibility import (
 from coupled.gap.findings.regimes import Acts, Regime, _regime, _size
 from coupled.gap.findings.result import EffectResult, StageResult
 from coupled.gap.search.case import Case
+from coupled.gap.search.problem import Problem
 from coupled.gap.signals.output import Output
 from coupled.gap.thresholds import DRIFT_CHANCE, REMAINDER
 from coupled.record.record import Record
@@ -75,10 +76,17 @@ def test_credibility_has_no_cliff() -> None:
     assert by_remainder[0] > 0.99  # where nothing remains, a free model has no say
 
 
-def verdict(probability: float, left: float, rivals: tuple[str, ...] = ()) -> str:
-    """Return the verdict on a bend of so much probability that leaves so much of a gap of 8."""
+def verdict(
+    probability: float, left: float, rivals: tuple[str, ...] = (), of_set: float = 0.9
+) -> str:
+    """Return the verdict on a bend of so much probability that leaves so much of a gap of 8.
+
+    `of_set` is the probability of the best set.
+    """
     effect: Any = SimpleNamespace(name="bend", stage="linkage")
-    choice: Any = SimpleNamespace(steps=(SimpleNamespace(effect=effect, rivals=rivals),))
+    choice: Any = SimpleNamespace(
+        steps=(SimpleNamespace(effect=effect, rivals=rivals),), probability=of_set
+    )
     stage = StageResult("linkage", gap=8.0, settled=8.0, limit=BOUND, left=left, guilty=True)
     budget: Any = SimpleNamespace(stage="linkage", of=lambda name: 0.95)
     found = EffectResult("bend", "linkage", probability, ())
@@ -93,6 +101,16 @@ def test_what_imitates_is_unexplained_though_nothing_remains() -> None:
     assert verdict(0.55, 1.0) == "unexplained"  # right in two of five
     assert (verdict(0.65, 1.0), verdict(0.65, 1.5)) == ("effect", "mostly")  # in five of six
     assert verdict(0.49, 1.0, ("stiffening_bend",)) == "ambiguous"
+
+
+@pytest.mark.parametrize(
+    ("probability", "of_set", "said"),
+    [(0.7, 0.7, "effect"), (0.7, 0.5, "ambiguous"), (0.55, 0.55, "ambiguous")],
+)
+def test_alternatives_are_ambiguous_where_no_set_has_half_of_the_probability(
+    probability: float, of_set: float, said: str
+) -> None:
+    assert verdict(probability, 1.0, ("stiffening_bend",), of_set) == said
 
 
 @pytest.mark.parametrize(
@@ -115,7 +133,7 @@ def test_a_doubtful_small_effect_leaves_open_only_itself(
         EffectResult("f", "loader", 0.97, ()),
         EffectResult("o", "loader", probability, ()),
     ]
-    choice: Any = SimpleNamespace(steps=steps)
+    choice: Any = SimpleNamespace(steps=steps, probability=0.9)
     assert verdict_of(choice, [stage], found, [budget]) == said
 
 
@@ -133,7 +151,7 @@ def test_a_stage_that_nothing_explains_counts_by_its_gap(
 ) -> None:
     """A loader at 1.35 floors of 1.24 made unexplained a play that closed a gap of 15."""
     play: Any = SimpleNamespace(name="soft_backlash", stage="linkage")
-    choice: Any = SimpleNamespace(steps=(SimpleNamespace(effect=play, rivals=()),))
+    choice: Any = SimpleNamespace(steps=(SimpleNamespace(effect=play, rivals=()),), probability=0.9)
     stages = [
         StageResult("loader", gap=loader, settled=loader, limit=BOUND, left=loader, guilty=True),
         StageResult("linkage", gap=linkage, settled=linkage, limit=BOUND, left=1.0, guilty=True),
@@ -155,7 +173,9 @@ def test_two_stages_are_explained_beside_one_that_is_not(
     names = {"linkage": 8.0, "loader": 1.3 if rest < 2.0 else 3.0, "surface": rest}
     explained = ("linkage", "loader") if rest < 2.0 else ("linkage",)
     effects = [cast(Any, SimpleNamespace(name=f"of {at}", stage=at)) for at in explained]
-    choice: Any = SimpleNamespace(steps=[SimpleNamespace(effect=e, rivals=()) for e in effects])
+    choice: Any = SimpleNamespace(
+        steps=[SimpleNamespace(effect=e, rivals=()) for e in effects], probability=0.9
+    )
     stages = [
         StageResult(at, gap, gap, BOUND, 1.0 if at in explained else gap, guilty=True)
         for at, gap in names.items()
@@ -172,7 +192,7 @@ def test_two_stages_are_explained_beside_one_that_is_not(
 def test_what_explains_sensing_counts_though_that_has_no_gap_of_its_own() -> None:
     """A force at 1.21 floors of 1.2 made unexplained a zero that had closed a gap of 17."""
     zero: Any = SimpleNamespace(name="deflection_zero", stage="sensing")
-    choice: Any = SimpleNamespace(steps=(SimpleNamespace(effect=zero, rivals=()),))
+    choice: Any = SimpleNamespace(steps=(SimpleNamespace(effect=zero, rivals=()),), probability=0.9)
     stages = [
         StageResult("loader", gap=3.1, settled=1.21, limit=1.2, left=1.21, guilty=True),
         StageResult("sensing", gap=17.5, guilty=True),
@@ -203,10 +223,10 @@ def test_a_hysteresis_of_the_pressure_is_no_lag(
     record = Record(
         ("time_s", "dynamic_pressure_Pa"), np.column_stack((np.arange(frames) / rate_Hz, pressure))
     )
-    found = credibility(lag, case, case.fit((lag,)), [record], 0.0)
+    found = credibility(lag, case, Problem(case).fit((lag,)), [record], 0.0)
     assert found.value > 0.99 if lag_s else found.value < 0.1
     monkeypatch.setattr(credible, "part_of_a_curve", lambda *_: 0.4)
-    assert credibility(lag, case, case.fit((lag,)), [record], 0.0).curve == 0.4
+    assert credibility(lag, case, Problem(case).fit((lag,)), [record], 0.0).curve == 0.4
 
 
 @pytest.mark.parametrize(("remains", "value"), [(0.0, 1.0), (0.9, 0.1)])

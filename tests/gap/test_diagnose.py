@@ -22,59 +22,8 @@ from coupled.rig.rigfile import read_rig
 from tests.support.commands import ROOT, coupled
 from tests.support.gaps import made, nominal_rig
 from tests.support.records import OWN, available, reference
+from tests.support.singles import SINGLES
 
-SINGLES: list[tuple[bool, str, dict[str, float]]] = [
-    (False, "coulomb_friction", {"friction_N": 2.0}),
-    (False, "presliding_friction", {"friction_N": 4.0, "stiffness_N_per_{d}": 2e4}),
-    (False, "viscous_damping", {"factor": 1.5}),
-    (False, "inertia", {"factor": 1.4}),
-    (False, "gradient_error", {"factor": 1.08}),
-    (False, "cubic_stiffness", {"cubic_N_per_{d}3": 2e5}),
-    (False, "breakout", {"breakout_N": 2.5}),
-    (True, "bob_weight", {"force_N_per_g": 8.0}),
-    (True, "force_offset", {"offset_N": 1.5}),
-    (False, "digital_multiplier", {}),
-    (False, "transport_delay", {"delay_s": 0.03}),
-    (False, "modifying_lag", {"lag_s": 0.02}),
-    (False, "asymmetric_friction", {"pull_N": 4.0, "push_N": 1.0}),
-    (False, "load_friction", {"factor": 0.08}),
-    (False, "friction_ripple", {"ripple_N": 3.0, "period_{d}": 6e-3, "phase_rad": 0.5}),
-    (False, "relaxation", {"stiffness_N_per_{d}": 300.0, "time_s": 0.6}),
-    (False, "force_limit", {"limit_N": 20.0}),
-    (False, "force_scale", {"factor": 1.06}),
-    (False, "force_zero", {"offset_N": 2.0}),
-    (False, "deflection_zero", {"offset_{d}": 1e-3}),
-    (False, "scale_drift", {"per_s": 2e-3}),
-    (False, "force_skew", {"delay_s": 0.02}),
-    (True, "motion_skew", {"delay_s": 0.05}),
-    (True, "deflection_scale", {"factor": 1.05}),
-    (True, "bend", {"bend_{d}_per_N": 1.6e-4}),
-    (False, "stiffening_bend", {"bend_{d}_per_N": 1.5e-4, "limit_{d}": 4e-3}),
-    (False, "backlash", {"play_{d}": 1e-3}),
-    (False, "soft_backlash", {"play_{d}": 1e-3, "stiffness_N_per_{d}": 6e4}),
-    (False, "bend_hysteresis", {"bend_{d}_per_N": 1e-4, "share": 0.3, "width_N": 8.0}),
-    (
-        False,
-        "structural_mode",
-        {"bend_{d}_per_N": 1e-4, "frequency_Hz": 6.0, "damping_ratio": 0.05},
-    ),
-    (False, "servo_lag", {"factor": 0.6}),
-    (False, "servo_rate_limit", {"rate_{d}_per_s": 0.06}),
-    (True, "cable_stretch", {"loss_per_Pa": 4e-5}),
-    (True, "surface_lag", {"lag_s": 0.08}),
-    (True, "surface_rate_limit", {"rate_norm_per_s": 0.4}),
-    (True, "surface_freeplay", {"play_norm": 0.02}),
-    (True, "rigging_offset", {"offset_norm": 0.01}),
-    (True, "elevator_effectiveness", {"factor": 0.85}),
-    (True, "pitch_damping", {"factor": 1.4}),
-    (True, "pitch_stiffness", {"factor": 1.3}),
-    (True, "lift_slope", {"factor": 0.9}),
-    (True, "mass", {"factor": 1.15}),
-    (True, "vertical_gust", {"rms_m_per_s": 0.5}),
-    (False, "pressure_lag", {"lag_s": 0.5}),
-    (False, "pressure_scale", {"factor": 1.06}),
-    (False, "schedule_slope", {"factor": 1.1}),
-]
 # Those that take longest to tell from their rivals; of each stage others are found in a moment.
 LONG = {"viscous_damping", "gradient_error", "cubic_stiffness", "breakout", "bob_weight"}
 LONG |= {"force_offset", "digital_multiplier", "transport_delay", "deflection_scale"}
@@ -87,6 +36,9 @@ LONG |= {"stiffening_bend", "cable_stretch", "surface_freeplay", "rigging_offset
 LONG |= {"surface_rate_limit", "servo_rate_limit", "pitch_damping"}
 LONG |= {"servo_lag", "deflection_zero", "pressure_scale"}
 
+# Friction by direction is even friction of the mean with an offset of half the difference: the
+# records do not distinguish them.
+EVEN = {"coulomb_friction", "force_offset"}
 # Forty seconds meet few gusts. The noise of F walks a contact that yields, smoothed as it is.
 ROUGHLY = {
     ("vertical_gust", "rms_m_per_s"): 0.25,
@@ -112,10 +64,15 @@ def test_a_single_effect_is_named_at_its_stage_and_size(
     tmp_path: Path, flown: bool, name: str, values: dict[str, float]
 ) -> None:
     found = diagnosed(tmp_path, flown, {name: values})
-    assert [effect.name for effect in found.effects] == [name], found
+    names = {effect.name for effect in found.effects}
+    assert names == {name} or (name, names) == ("asymmetric_friction", EVEN), found
     assert found.verdict in ("effect", "ambiguous")
     assert found.guilty == (BY_NAME[name].stage,)
-    got = {p.name: p.value for p in found.effects[0].parameters}
+    got = {p.name: p.value for effect in found.effects for p in effect.parameters}
+    if names == EVEN:
+        even, offset = got["friction_N"], got["offset_N"]
+        got = {"pull_N": even - offset, "push_N": even + offset}
+        name = max(EVEN)  # the summary names both
     for key, value in values.items():
         measured = got[key.format(d="m")]
         near = ROUGHLY.get((name, key), 0.06)

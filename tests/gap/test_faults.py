@@ -12,7 +12,7 @@ import pytest
 from numpy.typing import NDArray
 from rich.console import Console
 
-from coupled.cli.tables.gaps import print_stages
+from coupled.cli.tables import print_table
 from coupled.errors import InputError
 from coupled.gap import batch
 from coupled.gap.batch import jobs, run_all
@@ -23,6 +23,7 @@ from coupled.record.channels import ControlName
 from coupled.record.record import Record, write_record
 from coupled.rig.rig import Rig
 from coupled.rig.rigwrite import rig_text
+from coupled.tables.gaps import stages_table
 from tests.support.cluster import cluster
 from tests.support.commands import ROOT, coupled
 from tests.support.gaps import made, nominal_rig
@@ -81,7 +82,7 @@ def test_sensing_is_not_given_a_gap_that_nobody_measured(clean: Record) -> None:
 def test_a_stage_within_its_settings_is_told_by_its_own_limit() -> None:
     def printed(gap: float, settled: float) -> str:
         console = Console(file=io.StringIO(), width=80)
-        print_stages(console, [StageResult("loader", gap, settled, 1.4, settled)])
+        print_table(console, stages_table([StageResult("loader", gap, settled, 1.4, settled)]))
         assert isinstance(console.file, io.StringIO)
         return console.file.getvalue()
 

@@ -18,16 +18,13 @@ from coupled.gap.effects.library import BY_NAME, EFFECTS
 from coupled.gap.findings.diagnosis import Diagnosis
 from coupled.gap.findings.result import EffectResult, ParameterEstimate, StageResult
 from coupled.gap.findings.shrink import ChannelShrink, Shrink
-from coupled.gap.search.choose import Choice
-from coupled.gap.search.fit import Fit
-from coupled.gap.search.gain import Candidate
-from coupled.gap.search.rivals import Found
+from coupled.gap.search.found import Candidate, Choice, Fit, Found
 from coupled.gap.signals.output import Output, stage_gaps
 from coupled.gap.stages.airframe import airframe_outputs
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points
 from coupled.plots.gaps import FIGURES, draw_diagnosis
-from coupled.plots.gapview import View, channel_label, residual_shown, unit_shown
+from coupled.plots.gapview import View, channel_label, channel_shown
 from coupled.plots.saving import save
 from coupled.plots.signals import SIGNALS
 from coupled.plots.signatures import draw_signature
@@ -159,7 +156,8 @@ def test_a_residual_that_nothing_explains_is_held_against_everything(tmp_path: P
     record = made(tmp_path, nominal, {}, 5).between(0.0, 12.0)
     data = record.data.copy()
     at = record.channels.index("column_deflection_m")
-    data[:, at] += np.where(np.sin(record.time_s * 9.0) > 0.6, 2e-3, 0.0)
+    jumps = np.where(np.sin(record.time_s * 9.0) > 0.6, 2e-3, 0.0)
+    data[:, at] += jumps - jumps.mean()  # a mean would be a zero that is off
     spoiled = Record(record.channels, data)
     diagnosis = diagnose(nominal, {"r.csv": spoiled}, "column")
     assert diagnosis.verdict == "unexplained"
@@ -206,20 +204,26 @@ def test_a_signature_is_drawn_in_us_units(cases: Mapping[bool, Case]) -> None:
 
 
 def test_us_units_of_channels() -> None:
-    assert unit_shown("column_gradient_N_per_m", "us")[1] == "lb/in"
-    factor, unit = unit_shown("column_deflection_m", "us")
-    assert (round(factor, 4), unit) == (39.3701, "in")
-    assert residual_shown("column_deflection_m", "us")[1] == "in"
-    assert residual_shown("column_deflection_m") == (1000.0, "mm")
-    assert unit_shown("load_factor", "us") == (1.0, "g")
+    assert channel_shown("column_gradient_N_per_m", "us").unit == "lb/in"
+    shown = channel_shown("column_deflection_m", "us")
+    assert (round(shown.factor, 4), shown.unit) == (39.3701, "in")
+    assert channel_shown("column_deflection_m", "us", fine=True).unit == "in"
+    shown = channel_shown("column_deflection_m", fine=True)
+    assert (shown.factor, shown.unit) == (1000.0, "mm")
+    assert channel_shown("load_factor", "us").unit == "g"
 
 
 def test_channels_have_labels_and_units() -> None:
     assert channel_label("column_gradient_N_per_m") == "scheduled gradient G_T"
-    assert unit_shown("column_gradient_N_per_m")[1] == "N/m"
-    assert unit_shown("wheel_deflection_rad")[1] == "°"
-    assert unit_shown("pitch_rate_rad_per_s")[1] == "°/s"
-    assert unit_shown("load_factor") == (1.0, "g")
+    for name, unit in (
+        ("column_gradient_N_per_m", "N/m"),
+        ("column_deflection_m", "cm"),
+        ("wheel_deflection_rad", "°"),
+        ("pitch_rate_rad_per_s", "°/s"),
+        ("dynamic_pressure_Pa", "kPa"),
+        ("load_factor", "g"),
+    ):
+        assert channel_shown(name).label == f"{channel_label(name)}, {unit}"
 
 
 @pytest.mark.slow

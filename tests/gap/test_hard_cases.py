@@ -11,15 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from coupled.gap.diagnose import diagnose
-from coupled.gap.effects.library import BY_NAME, EFFECTS
-from coupled.gap.search.case import Case
-from coupled.gap.search.screen import screen
 from coupled.gap.signals.air import vertical_air
 from coupled.gap.signals.output import Output, white
 from coupled.gap.signals.shared import echoed
-from coupled.gap.stages.stages import Reader
-from coupled.gap.stages.surfaces import surface_points
-from coupled.gap.thresholds import STRETCH_s
+from coupled.gap.thresholds import CERTAIN, STRETCH_s
 from coupled.record.record import write_record
 from coupled.rig.rig import Rig
 from coupled.rig.rigwrite import rig_text
@@ -117,17 +112,27 @@ def test_a_digital_product_on_a_weak_spring_does_not_drift(tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize(
-    ("factor", "verdict"), [(1.015, "no_gap"), pytest.param(1.03, "effect", marks=pytest.mark.slow)]
+    ("factor", "verdict"),
+    [
+        (1.015, "no_gap"),
+        pytest.param(1.03, "no_gap", marks=pytest.mark.slow),
+        pytest.param(1.045, "effect", marks=pytest.mark.slow),
+    ],
 )
 def test_a_setting_is_no_effect_until_it_is_off_by_more(
     tmp_path: Path, factor: float, verdict: str
 ) -> None:
+    """The tolerance of 2 % is the 95 % interval of a Gaussian prior.
+
+    3 % off is 2.9 standard deviations, and the likelihood ratio of 7 is less than the odds of 55 to
+    1 against an effect; at 4.5 % it is over 1000.
+    """
     record = made(tmp_path, RIG, {"viscous_damping": {"factor": factor}}, 4)
     found = diagnose(RIG, {"r": record}, "column")
     judged, said = found.stage("loader").as_dict(), found.summary
     assert found.verdict == verdict
     assert judged["gap"] > judged["limit"]
-    assert judged["settled"] < judged["limit"]  # by the setting at the end of its tolerance
+    assert (judged["settled"] < judged["limit"]) == (verdict == "no_gap")
     if verdict == "effect":
         assert judged["where"]["follows"][0]["signal"] == "computed_rate_m_per_s"
         [effect] = found.effects
@@ -136,23 +141,11 @@ def test_a_setting_is_no_effect_until_it_is_off_by_more(
         assert "settings" not in said
     else:
         settings = {setting.name: setting.factor for setting in found.settings}
-        assert settings["damping"] == pytest.approx(factor, abs=0.003)
+        assert settings["damping"] == pytest.approx(min(factor, 1.02), abs=0.003)
         assert f"because of mass {100 * (settings['mass'] - 1):+.1f} %" in said
         assert (
             f"damping {100 * (settings['damping'] - 1):+.1f} %, each within its tolerance" in said
         )
-
-
-def test_an_effect_without_a_number_is_always_tried(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    record = made(tmp_path, RIG, {"inertia": {"factor": 1.4}}, 4)
-    case = Case(RIG, "column", Reader(RIG, record, "column", surface_points).outputs())
-    monkeypatch.setattr("coupled.gap.search.screen.SCREENED", 1)
-    kept = screen(case, case.fit(()), [e for e in EFFECTS if e.stage == "loader"])
-    assert len(kept) == 2
-    assert kept[0][0].free
-    assert kept[1][:2] == (BY_NAME["digital_multiplier"], [{}])
 
 
 @pytest.mark.slow
@@ -181,8 +174,13 @@ def test_a_faint_gap_names_the_law_of_dry_friction_that_it_shows(
     found = diagnose(RIG, {"r": made(tmp_path, RIG, law, 4)}, "column")
     settled = found.stage("loader").settled
     assert settled is not None and 1.2 < settled < 2.0
-    assert (found.verdict, found.rivals) == ("effect", ())
-    assert [effect.name for effect in found.effects] == [named]
+    assert found.verdict == "effect"
+    [effect] = found.effects
+    assert effect.name == named
+    # A breakaway of 0.06 N more than the running friction: plain friction may take its place.
+    faint = breakaway_N == 0.12
+    assert found.rivals in (((named, "coulomb_friction"),), ()) if faint else found.rivals == ()
+    assert effect.probability >= (CERTAIN if faint else 0.9)
 
 
 @pytest.mark.slow

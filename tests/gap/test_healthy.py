@@ -18,6 +18,7 @@ from coupled.blind.twin.twin import Twin
 from coupled.gap.effects.library import BY_NAME
 from coupled.gap.findings.healthy import ModelError, tolerances
 from coupled.gap.search.case import Case
+from coupled.gap.search.problem import Problem
 from coupled.gap.signals.output import Floats, Output, Predict
 from coupled.gap.thresholds import HEALTHY_ALONE, HEALTHY_SIGMAS
 from coupled.record.record import Record, read_record
@@ -127,7 +128,7 @@ def test_an_effects_tolerance_is_its_scatter_from_record_to_record() -> None:
         [Output("loader", "x", one, predict, 0.01, 100.0, record=i) for i, one in enumerate(seen)],
     )
     damping = BY_NAME["viscous_damping"]
-    found = case.fit((damping,))
+    found = Problem(case).fit((damping,))
     [wide] = tolerances(case, found).values()
     filed = rig.controls["column"].loader.damping
     assert wide == pytest.approx(HEALTHY_SIGMAS * np.std([1.1, 1.2, 1.4], ddof=1) * filed, rel=0.01)

@@ -10,8 +10,9 @@ import pytest
 from coupled.gap.diagnose import diagnose
 from coupled.gap.effects.library import EFFECTS
 from coupled.gap.nominal import fit_nominal
+from coupled.gap.prepare import readers_of
 from coupled.gap.signals.drives import as_driven
-from coupled.gap.stages.imposed import under_motion
+from coupled.gap.stages.tried import as_judged
 from tests.support.machines import damper, damper_rig
 
 
@@ -31,7 +32,8 @@ def test_a_grip_with_its_force_and_nothing_else_is_taken_as_moved() -> None:
 
 
 def test_of_the_linkage_play_alone_shows_in_the_force_of_a_loader_that_is_moved() -> None:
-    library = under_motion(EFFECTS, "computed")
+    reader = readers_of(damper_rig(), {"r": damper(seconds=6.0)}, "column")[0]
+    library = as_judged(EFFECTS, [reader], reader.outputs())
     moved = [effect for effect in library if effect.stage == "linkage"]
     assert [(effect.name, effect.shows_in) for effect in moved] == [("backlash", ("loader",))]
 

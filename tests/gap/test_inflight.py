@@ -14,7 +14,7 @@ from coupled.gap.findings.flown import Again, fly_force
 from coupled.gap.findings.inflight import EffectInFlight, in_flight, in_words
 from coupled.gap.findings.shapley import shapley_weights
 from coupled.gap.search.case import Case
-from coupled.gap.search.fit import Fit
+from coupled.gap.search.found import Fit
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
 from tests.support.gaps import made, nominal_rig

@@ -7,9 +7,7 @@ import pytest
 
 from coupled.gap.effects.library import BY_NAME
 from coupled.gap.findings.judge import Judge
-from coupled.gap.search.choose import Choice
-from coupled.gap.search.fit import Fit
-from coupled.gap.search.rivals import Found
+from coupled.gap.search.found import Choice, Fit, Found
 from coupled.gap.signals.output import Output
 from tests.support.gaps import nominal_rig
 

@@ -10,12 +10,12 @@ from coupled.gap.diagnose import diagnose
 from coupled.gap.effects.effect import apply
 from coupled.gap.effects.library import BY_NAME
 from coupled.gap.search.case import Case
-from coupled.gap.search.screen import screen
+from coupled.gap.search.problem import Problem
 from coupled.gap.signals.output import Output
 from coupled.gap.stages.stages import Reader
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
-from tests.support.gaps import made, nominal_rig
+from tests.support.gaps import made, nominal_rig, starts_of
 
 LOADER = "controls.column.loader."
 
@@ -34,10 +34,9 @@ def outputs(rig: Rig, record: Record) -> list[Output]:
 def test_less_friction_than_filed_is_fitted_down_to_none(tmp_path: Path) -> None:
     rig, record = filed_and_record(tmp_path, "friction_N", 3.0, 0.0)
     case, effect = Case(rig, "column", outputs(rig, record)), BY_NAME["coulomb_friction"]
-    settled = case.fit(())
-    [(_, [start], _)] = screen(case, settled, [effect])
+    [start] = starts_of(case, effect)
     assert start["coulomb_friction.friction_N"] < 0.0
-    found = case.fit((effect,), start=start)
+    found = Problem(case).fit((effect,), start)
     assert found.rig.controls["column"].loader.friction == pytest.approx(0.0, abs=0.03)
     # None at all is an answer, and no end of a range.
     assert "coulomb_friction.friction_N" not in found.at_bound

@@ -24,6 +24,8 @@ ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "coupled"
 # Modules of `gap/effects` that hold entries, where an effect's name is spelled.
 ENTRIES = ("library", "loader", "linkage", "sensing", "frictions")
+# Effects of machines of others, which are none of the contract's, and in no blind trial.
+IN_NO_TRIAL = {"servo_delay", "servo_tuning", "servo_acceleration_limit"}
 TWIN_OF = {kind.name: kind for kind in (*TWINS, *REVISION_2)}
 
 
@@ -36,7 +38,7 @@ def flown() -> Rig:
 def test_what_an_effect_needs_elsewhere_is_there(effect: Effect, flown: Rig) -> None:
     assert effect.stage in STAGES
     assert {stage_of(output) for output in effect.shows_in} <= set(STAGES)
-    if not effect.reserve:  # what is in reserve is none of the contract's, and in no trial
+    if effect.name not in IN_NO_TRIAL:
         assert TWIN_OF[effect.name].stage == effect.stage
     drawn = {effect.signature.x, effect.signature.y} - {""}
     assert drawn <= set(SIGNALS)
@@ -66,11 +68,11 @@ def test_an_effect_is_entered_under_its_keys_and_nothing_else(effect: Effect, fl
 
 def test_every_stage_and_name_is_listed_once() -> None:
     assert len(BY_NAME) == len(EFFECTS)
-    assert set(SETTINGS) == {effect.name for effect in EFFECTS if effect.tolerance}
-    assert {effect.name for effect in EFFECTS if not effect.reserve} <= set(TWIN_OF)
+    assert set(SETTINGS) == {e.name for e in EFFECTS if any(p.tolerance for p in e.free)}
+    assert set(BY_NAME) - IN_NO_TRIAL <= set(TWIN_OF)
     for effect in EFFECTS:
-        if effect.alike is not None:
-            assert effect.alike.plainer in BY_NAME
+        assert set(effect.contains) <= set(BY_NAME)
+        assert effect.name not in effect.contains
 
 
 def test_no_other_module_spells_an_effect() -> None:

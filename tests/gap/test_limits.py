@@ -12,12 +12,11 @@ from hypothesis import strategies as st
 from coupled.gap.diagnose import diagnose
 from coupled.gap.effects.library import BY_NAME, EFFECTS
 from coupled.gap.search.case import Case
-from coupled.gap.search.limits import is_limit, limits
-from coupled.gap.search.screen import screened
+from coupled.gap.search.screen import is_limit, limits
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points
 from coupled.gap.thresholds import LIMIT_SHARES
-from tests.support.gaps import made, nominal_rig
+from tests.support.gaps import made, nominal_rig, starts_of
 
 FORCE, SERVO = BY_NAME["force_limit"], BY_NAME["servo_rate_limit"]
 
@@ -30,7 +29,7 @@ def test_the_first_limit_tried_cuts_a_fiftieth_off_the_peak(peak: float) -> None
     assert tried[-1] >= FORCE.free[0].low
 
 
-def test_limits_of_what_is_in_reserve_are_tried_two_per_cent_apart() -> None:
+def test_limits_of_a_servo_are_tried_two_per_cent_apart() -> None:
     """A servo made to swing by 2.54 m/s² left 10 floors at that, and 40 by 2.6."""
     servo = BY_NAME["servo_acceleration_limit"]
     few, many = limits(servo, lambda value: value < 4.9)
@@ -60,7 +59,7 @@ def test_a_fit_starts_near_a_limit_that_only_the_peaks_meet(tmp_path: Path, shar
     record = made(tmp_path, rig, {"force_limit": {"limit_N": limit}}, 5)
     outputs = Reader(rig, record, "column", surface_points).outputs()
     case = Case(rig, "column", [one for one in outputs if one.stage == "loader"])
-    [start] = screened(case, case.fit(()), FORCE)[1]
+    [start] = starts_of(case, FORCE)
     assert start[FORCE.value_key(FORCE.free[0])] == pytest.approx(limit, rel=0.06)
 
 

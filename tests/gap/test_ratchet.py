@@ -12,7 +12,7 @@ from coupled.flight.manoeuvre import Manoeuvre, PressureProfile
 from coupled.flight.pilot import ForceTable
 from coupled.gap.effects.library import BY_NAME
 from coupled.gap.noise.resting import Rest
-from coupled.gap.search.fit import fit
+from coupled.gap.search.fit import fit_alone
 from coupled.gap.signals import driven
 from coupled.gap.stages import ratchet
 from coupled.gap.stages.ratchet import unratcheted
@@ -47,7 +47,7 @@ def test_a_play_is_found_as_large_beside_friction_as_without(
         record = trembling(made(tmp_path, rig, {"backlash": {"play_{d}": PLAY_m}}, seed), seed)
         outputs = Reader(rig, record, "column", surface_points).outputs()
         ours = [output for output in outputs if output.stage == "linkage"]
-        play = fit(rig, "column", ours, [BY_NAME["backlash"]])
+        play = fit_alone(rig, "column", ours, [BY_NAME["backlash"]])
         key = "backlash.play_{d}"
         assert play.low[key] < PLAY_m < play.high[key]
         found.append(play.values[key])

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from coupled.gap.effects.ripples import ripples
+from coupled.gap.effects.seen import ripples
 from coupled.gap.signals.output import Output
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points

@@ -8,8 +8,7 @@ from typing import cast
 
 import pytest
 
-from coupled.cli.gaps import _write_improved
-from coupled.cli.tables.gaps import in_words
+from coupled.cli.gaps import _write_improved, in_words
 from coupled.gap.findings.budget import Share, StageBudget, share_of
 from coupled.gap.findings.diagnosis import Diagnosis
 from coupled.record.record import Record

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from coupled.gap.effects.library import BY_NAME, EFFECTS
 from coupled.gap.effects.scales import Scales, in_scale
-from coupled.gap.search.fit import fit
+from coupled.gap.search.fit import fit_alone
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points
 from coupled.record.record import Record
@@ -78,7 +78,7 @@ def test_friction_is_found_over_eight_decades_of_force(force: float) -> None:
     reader = reader_of(rig, record)
     outputs = reader.outputs()
     effects = in_scale([BY_NAME["coulomb_friction"]], Scales.of([reader]), rig, "column")
-    found = fit(rig, "column", outputs, effects)
+    found = fit_alone(rig, "column", outputs, effects)
     (value,) = found.values.values()
     assert not found.at_bound
     assert value / force == pytest.approx(14.0, rel=0.02)

@@ -8,12 +8,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from coupled.gap.chain import STAGES
 from coupled.gap.diagnose import diagnose
+from coupled.gap.effects.effect import Effect
 from coupled.gap.effects.library import BY_NAME, EFFECTS
 from coupled.gap.nominal import fit_nominal
-from coupled.gap.signals.counts import as_counted
-from coupled.gap.signals.drives import as_driven, in_set_points
-from coupled.gap.stages.setpoints import under_set_points
+from coupled.gap.prepare import readers_of
+from coupled.gap.signals.drives import as_counted, as_driven, in_set_points
+from coupled.gap.signals.output import Output
+from coupled.gap.stages.tried import tried_effects
 from coupled.record.record import Record
 from tests.support.machines import servo, servo_rig, set_points
 
@@ -64,26 +67,34 @@ def test_one_record_that_shows_set_points_is_enough_for_the_machine() -> None:
     assert as_driven(rig, [slow, servo(POINTS)], "column") == servo_rig()
 
 
+def _tried(record: Record) -> list[Effect]:
+    """Return the effects that a record of set points lets be tried."""
+    readers = readers_of(servo_rig(), {"r": record}, "column")
+    outputs = [Output(stage, stage, POINTS, lambda _: POINTS, 1.0, 50.0) for stage in STAGES]
+    return tried_effects(EFFECTS, readers, outputs)
+
+
 def test_set_points_whose_grip_nobody_recorded_have_a_limit_at_any_rate() -> None:
     """As where a flight is judged by its surface alone."""
     record = servo(POINTS)
     at = [i for i, name in enumerate(record.channels) if name != "column_deflection_m"]
     blind = Record(tuple(record.channels[i] for i in at), record.data[:, at])
     [limit] = BY_NAME["servo_rate_limit"].parameters
-    library = under_set_points(EFFECTS, [blind], "column")
+    library = _tried(blind)
     assert next(one for one in library if one.name == "servo_rate_limit").parameters == (limit,)
 
 
 def test_a_set_point_has_no_scale_and_no_limit_below_the_speed_that_was_reached() -> None:
     swift = servo(POINTS)
-    library = under_set_points(EFFECTS, [swift], "column")
+    library = _tried(swift)
     left = {effect.name for effect in EFFECTS} - {effect.name for effect in library}
-    assert left == {"deflection_scale", "scale_drift", "mains_hum"}
+    of_channels = {"crosstalk", "vertical_gust"}  # which the record lacks
+    assert left == {"deflection_scale", "scale_drift", "mains_hum", *of_channels}
     [limit] = next(one for one in library if one.name == "servo_rate_limit").parameters
     speed = np.max(np.abs(np.gradient(swift["column_deflection_m"], 1 / 50)))
     assert 0.5 * speed < limit.low < 1.02 * speed
     slow = servo(np.clip(5e-4 * np.arange(1000), 0.0, 0.2))  # a ramp of 25 mm/s
-    library = under_set_points(EFFECTS, [slow], "column")
+    library = _tried(slow)
     [limit] = next(one for one in library if one.name == "servo_rate_limit").parameters
     assert 0.0 < limit.low < 0.025
 

@@ -14,6 +14,7 @@ from coupled.gap.effects.library import BY_NAME
 from coupled.gap.noise.noise import Noise
 from coupled.gap.noise.smooth import Smoother, smoothed
 from coupled.gap.search.case import Case
+from coupled.gap.search.problem import Problem
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points
 from coupled.record.record import Record
@@ -76,7 +77,7 @@ def test_a_servo_is_found_as_it_is_beside_coloured_noise_of_its_command() -> Non
         record = Record(tuple(data), np.column_stack(list(data.values())))
         outputs = Reader(nominal, record, "column", surface_points).outputs()
         case = Case(nominal, "column", [one for one in outputs if one.stage == "linkage"])
-        values = case.fit((BY_NAME["servo_delay"],)).values
+        values = Problem(case).fit((BY_NAME["servo_delay"],)).values
         found.append([values["servo_delay.factor"], values["servo_delay.delay_s"]])
     assert np.mean(found, axis=0) == pytest.approx([1.0, 0.02], rel=0.03)
 

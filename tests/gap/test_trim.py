@@ -14,6 +14,7 @@ from coupled.flight.aircraft import make_aircraft
 from coupled.gap.effects.effect import apply
 from coupled.gap.effects.library import BY_NAME
 from coupled.gap.search.case import Case
+from coupled.gap.search.problem import Problem
 from coupled.gap.signals.output import Output
 from coupled.gap.stages.airframe import TRIM, airframe_outputs
 from coupled.gap.stages.openloop import Moved, about, command_of, fly_open_loop
@@ -179,7 +180,7 @@ def test_a_mass_is_fitted_where_the_model_soon_ceases_to_trim(tmp_path: Path, ri
     models = edited_model(tmp_path, "T37", edit)
     weak = rig.changed({"flight.model_folder": str(models)})
     record = made(tmp_path, weak, {"mass": {"factor": 1.05}}, 4)
-    found = Case(weak, "column", airframe_outputs(weak, record)).fit([BY_NAME["mass"]])
+    found = Problem(Case(weak, "column", airframe_outputs(weak, record))).fit([BY_NAME["mass"]])
     assert found.values["mass.factor"] == pytest.approx(1.05, abs=2e-3)
     with pytest.raises(InputError, match="does not trim"):
         own_trim(real(weak, "mass", 1.15), "column")

@@ -9,6 +9,7 @@ import pytest
 from coupled.gap.diagnose import diagnose
 from coupled.gap.effects.library import BY_NAME
 from coupled.gap.search.case import Case
+from coupled.gap.search.problem import Problem
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points
 from tests.support import gaps
@@ -43,6 +44,6 @@ def test_a_fit_of_a_play_does_not_end_short_of_one_that_swallows_all(
     record = gaps.made(tmp_path, nominal, {"surface_freeplay": {"play_norm": 0.12}}, 4, 6.0)
     outputs = Reader(nominal, record, "column", surface_points).outputs()
     case = Case(nominal, "column", [one for one in outputs if one.stage == "surface"])
-    fitted = case.fit([PLAY], start={PLAY.value_key(PLAY.free[0]): start})
+    fitted = Problem(case).fit([PLAY], {PLAY.value_key(PLAY.free[0]): start})
     assert fitted.values[PLAY.value_key(PLAY.free[0])] == pytest.approx(0.03695, rel=0.01)
     assert case.gaps(fitted.rig)["surface"] < 1.1

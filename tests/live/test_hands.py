@@ -14,7 +14,7 @@ from coupled.flight.event import Event
 from coupled.flight.loop import fly
 from coupled.flight.pilot import Step
 from coupled.live.attach import rig_live, run_live
-from coupled.live.hands import Follower
+from coupled.live.hands import PositionFilter
 from coupled.live.host import Host, Plan, Request
 from coupled.live.session import fly_live
 from coupled.live.stick import Stick, axes_of
@@ -55,7 +55,7 @@ def test_a_missing_stick_is_refused() -> None:
 
 
 def test_a_follower_is_smooth_and_stays_within_the_travel() -> None:
-    follower = Follower(0.1, 1.0 / 120.0)
+    follower = PositionFilter(0.1, 1.0 / 120.0)
     way = [follower.move(5.0) for _ in range(120)]
     assert way[0] == pytest.approx(0.1 * -math.expm1(-1.0 / 120.0 / 0.04))
     assert max(way) == pytest.approx(0.1)
@@ -97,7 +97,7 @@ class Looker:
 
 def test_the_hand_follows_the_stick_with_the_force_that_the_loader_needs() -> None:
     manoeuvre = rig_live("report-column", 4.0)
-    record = fly_live(manoeuvre, Plan(paced=False, wishes=Wanted())).record
+    record = fly_live(manoeuvre, Plan(paced=False, hand_positions=Wanted())).record
     held = record.between(3.0, 4.0)
     travel = manoeuvre.rig.controls["column"].travel
     assert held["column_deflection_m"] == pytest.approx(0.2 * travel, rel=0.01)
@@ -114,7 +114,7 @@ def test_switches_marks_and_stop_act_at_their_frame() -> None:
         (3.0, Request("set", "nonsense", "column", 1.0)),
         (3.5, Request("stop")),
     ]
-    plan = Plan(paced=False, wishes=Wanted(), watchers=[Looker(*words)], warn=warned.append)
+    plan = Plan(paced=False, hand_positions=Wanted(), watchers=[Looker(*words)], warn=warned.append)
     flight = fly_live(rig_live("report-column", None), plan)
     record, live = flight.record, flight.record.manifest["live"]
     assert flight.stopped
@@ -136,7 +136,7 @@ def test_a_service_set_live_is_recorded_as_the_event_of_a_run() -> None:
     plain = replace(plain, pilots={"column": Step(force_N=30.0, start_s=0.2)})
     events = {name: Event(service=name, control="column", at=at, to=to) for name, at, to in led}
     batch = fly(replace(plain, conditions=Conditions(event=events)))
-    words = [(at, Request("lead", name, "column", to)) for name, at, to in led]
+    words = [(at, Request("service", name, "column", to)) for name, at, to in led]
     live = fly_live(plain, Plan(paced=False, watchers=[Looker(*words)])).record
     assert live.channels == batch.channels
     assert np.array_equal(live.data, batch.data)
@@ -149,7 +149,7 @@ def test_a_service_set_live_is_recorded_as_the_event_of_a_run() -> None:
 
 
 def test_a_bench_is_flown_live_too() -> None:
-    record = fly_live(rig_live("bench", 1.0), Plan(paced=False, wishes=Wanted())).record
+    record = fly_live(rig_live("bench", 1.0), Plan(paced=False, hand_positions=Wanted())).record
     assert len(record) > 50
     assert record["column_deflection_m"][-1] > 0.0
 
@@ -171,7 +171,7 @@ def test_a_trim_released_live_keeps_its_spring_and_damper_as_in_a_run() -> None:
     plain = replace(plain, rig=rig, pilots={"column": Step(force_N=30.0, start_s=0.2)})
     released = Event(service="trim_release", control="column", at=1.0, to=1.0)
     batch = fly(replace(plain, conditions=Conditions(event={"release": released})))
-    word = Request("lead", "trim_release", "column", 1.0)
+    word = Request("service", "trim_release", "column", 1.0)
     live = fly_live(plain, Plan(paced=False, watchers=[Looker((1.0, word))])).record
     assert np.array_equal(live.data, batch.data)
     assert live["column_service_force_N"][-1] < -10.0

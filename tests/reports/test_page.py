@@ -17,15 +17,14 @@ from coupled.reports.page import (
     Drawing,
     InputFile,
     Made,
-    Mark,
     Report,
     Section,
-    Table,
     Text,
     Verdict,
     render,
     typeset,
 )
+from coupled.tables.table import Mark, Table
 from tests.support.browser import CHROMIUM, PAPERS, printed
 
 MADE = Made("coupled compare x", (("coupled", "1"),), (InputFile("x.toml", "ab12", "name = 1"),))

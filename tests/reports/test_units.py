@@ -10,24 +10,25 @@ import numpy as np
 import polars as pl
 import pytest
 
+from coupled.authority.figures import kept_figure
 from coupled.calibration.documentation import document
 from coupled.calibration.qualification import Issue, feel_tests
 from coupled.calibration.readingsfile import read_readings
 from coupled.campaign.check import CheckResult
 from coupled.campaign.verdict import Verdict
-from coupled.cli.tables.campaign import print_sweep
+from coupled.cli.tables import print_table
 from coupled.cli.terminal import SafeConsole
 from coupled.display import System, in_system
 from coupled.plots.campaign import draw_sweep
 from coupled.plots.checks import draw_static_checks
 from coupled.plots.documentation import draw_forces
-from coupled.plots.sweepview import WORDS, Shown
 from coupled.reports.check import check_report
 from coupled.reports.forces import force_summary
 from coupled.reports.made import made_by
 from coupled.reports.page import render
 from coupled.resources import shipped_rigs
 from coupled.rig.rigfile import read_rig
+from coupled.tables.campaign import spread_table
 from coupled.units import POUND_N
 from tests.support.commands import coupled
 from tests.support.runs import SHORT
@@ -100,15 +101,15 @@ def test_a_sweeps_table_and_figure_have_the_same_units(
 ) -> None:
     names = ["peak_rate_rad_per_s", "force_N", "felt_ratio"]
     drawn = draw_sweep(TABLE, ["k"], names, system=system)
-    print_sweep(SafeConsole(width=100), TABLE, names, system)
+    print_table(SafeConsole(width=100), spread_table(TABLE, names, system))
     printed = capsys.readouterr().out
     for axes, name in zip(drawn.axes, names, strict=True):
         word, _, unit = axes.get_ylabel().partition(", ")
-        assert word == WORDS[name]
+        assert word == kept_figure(name).words
         line = next(each for each in printed.splitlines() if f", {unit} " in each)
         most = float(np.asarray(axes.get_lines()[0].get_ydata())[-1])
         assert f"{most:.3g}" in line
-        assert Shown.of(name, system).factor * TABLE[name][1] == pytest.approx(most)
+        assert kept_figure(name, system).factor * TABLE[name][1] == pytest.approx(most)
 
 
 def test_a_check_in_us_units_has_them_in_its_report() -> None:

@@ -23,8 +23,10 @@ def packed(given: Hand, bend: float = K_REPORT) -> tuple[Any, Any]:
 
 def asked(p: Any, s: Any, script: float, held: float, rate: float) -> tuple[float, float]:
     """Return the force that a hand would have at the next node, and its integral's gain, N."""
-    gain = hand.ask(p["hand"], s["hand"], p["linkage"], s["linkage"], script, held, rate, H)
-    return float(s["hand"]["asked"]), gain
+    gain = hand.command_force(
+        p["hand"], s["hand"], p["linkage"], s["linkage"], script, held, rate, H
+    )
+    return float(s["hand"]["commanded"]), gain
 
 
 @pytest.mark.parametrize("mass", [0.0, 0.6])
@@ -63,14 +65,14 @@ IMPEDANCES = [Hand(stiffness=50.0), Hand(damping=5.0), Hand(integral=900.0), Han
 @pytest.mark.parametrize("given", IMPEDANCES)
 def test_each_gain_alone_is_an_impedance(given: Hand) -> None:
     assert hand.has_impedance(packed(given)[0]["hand"])
-    assert not hand.only_scripted(packed(given)[0]["hand"])
+    assert not hand.is_scripted(packed(given)[0]["hand"])
 
 
 def test_a_hand_that_lags_is_scripted_and_one_with_a_limit_is_not() -> None:
-    assert hand.only_scripted(packed(Hand(lag_s=0.1))[0]["hand"])
+    assert hand.is_scripted(packed(Hand(lag_s=0.1))[0]["hand"])
     weak = packed(Hand(strongest=9.0, lasting=3.0))[0]["hand"]
     assert not hand.has_impedance(weak)
-    assert not hand.only_scripted(weak)
+    assert not hand.is_scripted(weak)
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
@@ -85,8 +87,10 @@ def test_full_strength_lasts_for_the_endurance_and_comes_back_with_rest(
     def goes_on(force_N: float, steps: int) -> list[float]:
         found = []
         for _ in range(steps):
-            hand.ask(p["hand"], s["hand"], p["linkage"], s["linkage"], force_N, 0.0, 0.0, h)
-            found.append(float(s["hand"]["asked"]))
+            hand.command_force(
+                p["hand"], s["hand"], p["linkage"], s["linkage"], force_N, 0.0, 0.0, h
+            )
+            found.append(float(s["hand"]["commanded"]))
             hand.hold(p["hand"], s["hand"], p["linkage"], s["linkage"], found[-1], 0.0, h)
         return found
 

@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from coupled.rig.friction import (
     FADED,
     SLIPS_ALL,
-    kept_at,
+    presliding_speed,
     reached,
     running_friction,
+    stribeck_factor,
     yielded,
-    yielding_speed,
 )
 from coupled.rig.packing import pack
 from coupled.rig.rig import Rig
@@ -104,7 +104,7 @@ def test_a_steps_speed_balances_its_forces(
     p = pack(bench({**YIELDS, **breakaway}))[0]["parameters"]["friction"]
     inertia = 2.0 * 4.0 / span
     start = bent * float(running_friction(p, rate)) / STIFFNESS
-    u, after = yielding_speed(p, start, rate, push_N, inertia, span, 0.0)
+    u, after = presliding_speed(p, start, rate, push_N, inertia, span, 0.0)
     ends, mean = yielded(p, running_friction(p, u), start, u * span)
     fading = math.exp(-((u / p["stribeck_rate"]) ** 2))
     force = STIFFNESS * mean + p["contact_damping"] * fading * (ends - start) / span
@@ -125,8 +125,8 @@ def test_the_stribeck_part_vanishes_at_high_speed() -> None:
     p = pack(bench(YIELDS))[0]["parameters"]["friction"]
     for ratio in (0.0, 0.7, -2.0, 5.9):
         rate = ratio * float(p["stribeck_rate"])
-        assert float(kept_at(p, rate)) == pytest.approx(math.exp(-(ratio**2)), rel=1e-12)
-    assert kept_at(p, 1.01 * FADED * float(p["stribeck_rate"])) == 0.0
+        assert float(stribeck_factor(p, rate)) == pytest.approx(math.exp(-(ratio**2)), rel=1e-12)
+    assert stribeck_factor(p, 1.01 * FADED * float(p["stribeck_rate"])) == 0.0
 
 
 def test_a_small_force_is_held_by_spring_and_contact_together() -> None:

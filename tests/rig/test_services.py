@@ -19,14 +19,14 @@ from coupled.resources import shipped_rigs
 from coupled.rig.packing import pack
 from coupled.rig.rigfile import read_rig
 from coupled.rig.serving import (
-    LED,
-    check_led,
+    SERVICES,
+    check_service,
+    copy_service_rows,
     held_force,
-    lead,
-    led,
-    noted,
     service_channels,
+    service_command,
     services_of,
+    set_service,
 )
 from coupled.schema import build
 from tests.support.rigs import bench
@@ -450,14 +450,14 @@ def test_a_flying_rig_is_led_and_read_by_one_function() -> None:
     controls = pack(bench(STRAIGHT))
     assert not controls["state"]["services"]["on"][0]
     for service in services_of("column"):
-        lead(controls, ["column"], "column", service, 0.5)
-        assert led(controls, ["column"], "column", service) == 0.5
+        set_service(controls, ["column"], "column", service, 0.5)
+        assert service_command(controls, ["column"], "column", service) == 0.5
     assert controls["state"]["services"]["on"][0]
     row = np.ones((1, len(service_channels("column"))))
-    noted(controls, ["column"], ["column"], row)
+    copy_service_rows(controls, ["column"], ["column"], row)
     assert not row.any()  # nothing is recorded before the first frame
     assert "trim_rad" in services_of("wheel")
-    assert len(services_of("wheel")) == len(LED)
+    assert len(services_of("wheel")) == len(SERVICES)
 
 
 def test_only_an_autopilot_that_engages_takes_the_place_where_the_control_is() -> None:
@@ -466,8 +466,8 @@ def test_only_an_autopilot_that_engages_takes_the_place_where_the_control_is() -
     state["loader"]["computed"] = 0.03
 
     def holds_at(service: str, value: float) -> float:
-        lead(controls, ["column"], "column", service, value)
-        return led(controls, ["column"], "column", "autopilot_m")
+        set_service(controls, ["column"], "column", service, value)
+        return service_command(controls, ["column"], "column", "autopilot_m")
 
     assert holds_at("autopilot_m", 0.01) == 0.01
     assert holds_at("shaker", 1.0) == 0.01
@@ -489,10 +489,10 @@ def test_a_switch_is_led_from_0_to_1_and_a_place_within_the_travel() -> None:
     for service in services_of("column"):
         low, high = ends.get(service, (-1e3, 1e3))
         for to in (low, high):
-            check_led(rig, "column", service, to, "test", "event.it")
+            check_service(rig, "column", service, to, "test", "event.it")
         for to in (low - 0.05, high + 0.05) if service in ends else ():
             with pytest.raises(InputError, match=r"event\.it\.to"):
-                check_led(rig, "column", service, to, "test", "event.it")
+                check_service(rig, "column", service, to, "test", "event.it")
 
 
 @pytest.mark.parametrize(

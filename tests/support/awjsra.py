@@ -1,4 +1,4 @@
-"""The Augmentor Wing aircraft in JSBSim itself, without a rig: what its tests share."""
+"""The Augmentor Wing aircraft in JSBSim without a rig, shared by its tests."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ def script(name: str) -> ModuleType:
 
 
 def validation() -> ModuleType:
-    """Return the module behind the table of published against flown."""
+    """Return the module that makes the table of published and flown values."""
     return script("validate")
 
 
 def trimmed(properties: dict[str, float] | None = None, **flight: float) -> Any:
-    """Return the aircraft trimmed as its rig file says, but for some keys of the file."""
+    """Return the aircraft trimmed as in its rig file, with some keys changed."""
     assert RIG.flight is not None
     changes: dict[str, Any] = {f"flight.{key}": value for key, value in flight.items()}
     changes["flight.properties"] = {**RIG.flight.properties, **(properties or {})}
@@ -42,7 +42,7 @@ def trimmed(properties: dict[str, float] | None = None, **flight: float) -> Any:
 
 
 def place(fdm: Any, levers: dict[str, float] | None = None, **state: float) -> Any:
-    """Put a trimmed aircraft into another state of flight, its levers where they are put.
+    """Set a trimmed aircraft to another state of flight and lever positions.
 
     A state is named as JSBSim names it, without its `ic/` and with two underscores for a dash.
     """

@@ -1,4 +1,4 @@
-"""A ball screw's axis that moves from point to point: simulated by other laws, no stage of ours.
+"""A ball screw's axis that moves from point to point, simulated without the package's stages.
 
 A mass of 400 kg behind a screw of 10 mm, with bristles for friction that falls with the speed, a
 ripple once a turn, and a scale on the table beside the motor's encoder. Friction and damping differ
@@ -23,7 +23,7 @@ COUNT_m = 1e-6
 
 
 def _wanted(seconds: float, rng: np.random.Generator) -> NDArray[np.float64]:
-    """Return where the axis should be: moves of 0.02 to 0.1 m/s between points, and rests."""
+    """Return the reference position: moves of 0.02 to 0.1 m/s between points, and rests."""
     t = np.arange(round(seconds * FINE_Hz)) / FINE_Hz
     speed, at, place = np.zeros_like(t), 0.5, 0.0
     while at < seconds - 1.0:
@@ -46,7 +46,7 @@ def ball_screw(
     play_m: float = 0.0,
     seconds: float = 20.0,
 ) -> Record:
-    """Return a record of the motor's force, its encoder and the scale, 100 a second.
+    """Return a record of the motor's force, its encoder and the scale at 100 Hz.
 
     `friction` and `damping` are times what they are when it is well.
     """
@@ -78,6 +78,6 @@ def ball_screw(
 
 
 def ball_screw_rig() -> Rig:
-    """Return a rig of it by its data sheet: some % off, without offset, ripple and fading."""
+    """Return its rig by the data sheet: some % off, without offset, ripple, Stribeck effect."""
     numbers = {"mass_kg": 380.0, "damping_N_s_per_m": 900.0, "friction_N": 140.0}
     return plain_rig(RATE_Hz, numbers | {"servo_frequency_Hz": 20_000.0})  # nothing lies between

@@ -1,4 +1,4 @@
-"""What benchmarks measured, kept in docs/benchmarks.json, and the README's sentences from it.
+"""Results of benchmarks, in docs/benchmarks.json, and the README's sentences from them.
 
     COUPLED_BENCHMARKS=keep pytest -m bench -s
 
@@ -29,7 +29,7 @@ Figures = Mapping[str, float]
 
 
 def processor() -> str:
-    """Return the processor's name, as far as the system gives one."""
+    """Return the processor's name, if the system gives it."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:
@@ -44,7 +44,7 @@ def everything() -> dict[str, Any]:
 
 
 def keep(name: str, figures: Figures, load_before: float) -> None:
-    """Write a benchmark's figures, where the environment asks for it.
+    """Write a benchmark's figures if the environment requests it.
 
     `load_before` is the machine's load (mean of a minute) when the benchmark began: that of others.
     """
@@ -71,18 +71,18 @@ def keep(name: str, figures: Figures, load_before: float) -> None:
 
 
 def kept_figures(name: str) -> dict[str, float]:
-    """Return the figures of a benchmark that are in the file; none if it was never kept."""
+    """Return the figures of a benchmark in the file; none if it has none."""
     return dict(everything().get(name, {"figures": {}})["figures"])
 
 
 def under(name: str) -> str:
-    """Return where a benchmark's figures are kept, and on how many cores they were measured."""
+    """Return the link to a benchmark's figures, with the number of cores."""
     cores = everything()[name]["machine"]["cores"]
     return f"([measured](docs/benchmarks.json) on {cores} cores)"
 
 
 def frame_cost() -> str:
-    """Return what the README says of a frame's cost; no figure without a measurement."""
+    """Return the README's sentence on a frame's cost, from the measurement."""
     names = {n: f"frame cost, {n} control(s)" for n in (1, 3)}
     each = [list(kept_figures(name).values()) for name in names.values()]
     if not all(each):
@@ -98,7 +98,7 @@ def frame_cost() -> str:
 
 
 def sweep_rate() -> str:
-    """Return what the guide says of a sweep's rate; no figure without a measurement."""
+    """Return the guide's sentence on a sweep's rate, from the measurement."""
     kept = kept_figures("sweep")
     if not kept:
         return f"{HELD} (`pytest -m bench tests/benchmarks/test_campaign.py -s`)."
@@ -110,7 +110,7 @@ def sweep_rate() -> str:
 
 
 def diagnosis_seconds() -> str:
-    """Return what the guide says a diagnosis takes; no figure without a measurement."""
+    """Return the guide's sentence on the time of a diagnosis, from the measurement."""
     name = "diagnosis of 60 s"
     ends = ", wall_s by all"
     taken = {key.removesuffix(ends): s for key, s in kept_figures(name).items() if ends in key}

@@ -1,4 +1,4 @@
-"""A real browser, without a window: what a page says on its console, and how it prints."""
+"""A real browser without a window: a page's console messages and its print."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ PAPERS = {"A4": (595, 842), "Letter": (612, 792)}  # points
 
 
 def printed(page: Path, paper: str) -> tuple[Path, list[str]]:
-    """Print a page on a paper; return the PDF, and what the browser said of the page."""
+    """Print a page on a paper size; return the PDF and the browser's messages."""
     assert CHROMIUM is not None
     sized = page.with_name(f"{page.stem}-{paper}.html")
     text = page.read_text(encoding="utf-8")

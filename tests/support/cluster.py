@@ -1,4 +1,4 @@
-"""A dask cluster on this machine, in processes of its own."""
+"""A dask cluster on this machine, in separate processes."""
 
 from __future__ import annotations
 

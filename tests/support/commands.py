@@ -25,7 +25,7 @@ HANDLED = (signal.SIGINT, signal.SIGTERM)
 
 
 def coupled(folder: Path, *words: str, columns: int = 80) -> subprocess.CompletedProcess[str]:
-    """Give a command in this process, where all is imported and compiled; return what came.
+    """Run a command in this process, where all is imported and compiled; return its result.
 
     Standard output and error are files under the command, also for a library in C.
     """
@@ -33,7 +33,7 @@ def coupled(folder: Path, *words: str, columns: int = 80) -> subprocess.Complete
         patch.dict(os.environ, {**TERMINAL, "COLUMNS": str(columns)}),
         patch.object(sys, "argv", ["coupled", *words]),
         _as_wide_as(columns),
-        _standing_in(folder),
+        _working_in(folder),
         _to_file("stdout", 1) as printed,
         _to_file("stderr", 2) as said,
     ):
@@ -48,7 +48,7 @@ def coupled(folder: Path, *words: str, columns: int = 80) -> subprocess.Complete
 
 
 def _without_progress(text: str) -> str:
-    """Return what a command printed, without the lines that a slow machine adds in a pipe."""
+    """Return a command's output, without the progress lines of a slow machine."""
     return "".join(line for line in text.splitlines(keepends=True) if not _PROGRESS.match(line))
 
 
@@ -74,7 +74,7 @@ def files(folder: Path) -> set[str]:
 
 @contextmanager
 def _as_wide_as(columns: int) -> Iterator[None]:
-    """Let the consoles be so wide: they may have taken another width when they were made."""
+    """Set the width of the consoles: they may have taken another one when they were made."""
     before = [(console, console.width) for console in (out, err)]
     for console, _ in before:
         console.width = columns
@@ -86,8 +86,8 @@ def _as_wide_as(columns: int) -> Iterator[None]:
 
 
 @contextmanager
-def _standing_in(folder: Path) -> Iterator[None]:
-    """Stand in a folder; put back what a command sets for its whole process."""
+def _working_in(folder: Path) -> Iterator[None]:
+    """Change to a folder; restore what a command sets for its process."""
     before, handlers = Path.cwd(), [signal.getsignal(each) for each in HANDLED]
     os.chdir(folder)
     try:
@@ -100,7 +100,7 @@ def _standing_in(folder: Path) -> Iterator[None]:
 
 @contextmanager
 def _to_file(name: str, descriptor: int) -> Iterator[TextIO]:
-    """Turn a standard stream, and what lies under it, to a file."""
+    """Redirect a standard stream and its file descriptor to a file."""
     stream: TextIO = getattr(sys, name)
     stream.flush()
     kept = os.dup(descriptor)

@@ -1,4 +1,4 @@
-"""Flights by JSBSim alone, of a rig exported for them."""
+"""Flights of exported rigs by JSBSim alone."""
 
 from __future__ import annotations
 
@@ -36,14 +36,14 @@ def on_bench(rig: Rig, pilot: Pilot, seconds: float, pressure_Pa: float = 3000.0
 
 
 def forces(times_s: list[float], forces_N: list[float]) -> ForceTable:
-    """Return a pilot's force, straight between the times."""
+    """Return a pilot's force, linear between the times."""
     return ForceTable(time_s=times_s, force_N=forces_N)
 
 
 def both(
     manoeuvre: Manoeuvre, configuration: Configuration = COMPENSATED, rate_Hz: float = 960.0
 ) -> tuple[Record, Record, str]:
-    """Return our own flight, that of JSBSim alone, and what JSBSim said."""
+    """Return coupled's flight, that of JSBSim alone, and JSBSim's output."""
     flown = [Flown(manoeuvre, (configuration,))]
     made = export(manoeuvre.rig, flown, rate_Hz=rate_Hz, check=False)
     configured = manoeuvre.configured(configuration)

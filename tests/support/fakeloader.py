@@ -1,10 +1,10 @@
-"""A loader in a process of its own, of the twin's physics: for the open protocol, or CLS2Sim's.
+"""A simulated loader in a separate process, by the twin: the open protocol, or CLS2Sim's.
 
     python -m tests.support.fakeloader udp PORT [NAME=VALUE …]
 
 NAME is a number of the twin's (`play`, `bend`, …); `hand` is the force in N of its pilot, who
 sweeps from 0.2 to 2.5 Hz; `noise` is the share of the usual noise. Prints `ready` and its port.
-`dies` is the time in s at which it ends without a word.
+`dies` is the time in s at which it ends without a message.
 """
 
 from __future__ import annotations
@@ -83,7 +83,7 @@ class Twin:
         return np.asarray(self._hand * np.sin(phase) * np.clip(10.0 * u, 0.0, 1.0))
 
     def run(self, order: Block) -> None:
-        """Run a frame under an order."""
+        """Advance a frame under an order."""
         t = (self.frames + np.arange(NODES + 1) / NODES) * self._frame_s
         if t[0] >= self._dies:
             os._exit(9)
@@ -95,11 +95,11 @@ class Twin:
         self.frames += 1
 
     def bare(self) -> None:
-        """Take the loader's own spring and damping away: the host makes the whole load."""
+        """Remove the loader's own spring and damping: the host computes the whole load."""
         self._numbers["basic_gradient"] = self._numbers["damping"] = 0.0
 
     def push(self, force_N: float) -> None:
-        """Run a frame under a force of the motor, held over it."""
+        """Advance a frame under a constant force of the motor."""
         self._offset = force_N
         self.run((0.0, 0.0, 0.0, 0.0))
 
@@ -111,7 +111,7 @@ class Twin:
 
 
 def serve_udp(port: int, twin: Twin) -> None:
-    """Be a loader of the open protocol that steps a frame for each of the host's orders."""
+    """Serve the open protocol; each order of the host advances the loader by a frame."""
     loader = Loader(port)
     print("ready", loader.port, flush=True)
     quiet = 0
@@ -126,7 +126,7 @@ def serve_udp(port: int, twin: Twin) -> None:
 
 
 def serve_cls2sim(port: int, twin: Twin) -> None:
-    """Be CLS2Sim's external control over UDP, with COUNTS to a newton; a frame a request.
+    """Serve CLS2Sim's external control over UDP, COUNTS per newton, one frame per request.
 
     The hardware has no spring: the host's force moves mass and damping, and it gives positions
     from 0 to 1.
@@ -151,7 +151,7 @@ def serve_cls2sim(port: int, twin: Twin) -> None:
 
 
 def serve_v2(port: int, twin: Twin) -> None:
-    """Be CLS2Sim's protocol v2 over TCP: force and position are read, the profile is scaled."""
+    """Serve CLS2Sim's protocol v2 over TCP: force and position are read, the profile is scaled."""
     with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as door:
         door.bind(("127.0.0.1", port))
         door.listen(1)

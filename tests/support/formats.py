@@ -1,4 +1,4 @@
-"""A test of two sensors, logged in each format by its own library, the second by its own clock."""
+"""A test with two sensors, logged in each format by its own library; each sensor has its clock."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ DEFLECTION_in = np.sin(LATER_s)
 
 
 def write_mdf(path: Path, conversion: dict[str, Any] | None = None) -> None:
-    """Write two groups, each with its master; counts of `force` that a `conversion` makes lbf."""
+    """Write two groups, each with its master; a `conversion` turns counts of `force` into lbf."""
     counts = np.rint(1000.0 * FORCE_lbf).astype(np.int32)
     conversion = conversion or {"a": 0.001, "b": 0.0}
     with MDF(version="4.10") as mdf:
@@ -64,7 +64,7 @@ def _messages() -> list[tuple[int, str, float]]:
 
 
 def write_mcap_json(path: Path) -> None:
-    """Write messages in JSON whose recorder stamps them unevenly, and their sensors evenly."""
+    """Write messages in JSON, stamped unevenly by the recorder and evenly by the sensors."""
     late = np.random.default_rng(4).uniform(0.0, 0.004, len(_messages()))
     with path.open("wb") as file:
         writer: Any = Writer(file)
@@ -80,7 +80,7 @@ def write_mcap_json(path: Path) -> None:
 
 
 def write_mcap_ros2(path: Path) -> None:
-    """Write messages of ROS 2, stamped as they were taken."""
+    """Write messages of ROS 2, with the sensors' stamps."""
     with path.open("wb") as file, Ros2(file) as writer:
         schema = writer.register_msgdef("hand/msg/Reading", "float64[2] data\nstring frame")
         for ns, topic, value in _messages():
@@ -89,7 +89,7 @@ def write_mcap_ros2(path: Path) -> None:
 
 
 def write_mcap_protobuf(path: Path) -> None:
-    """Write messages of protobuf, stamped as they were taken."""
+    """Write messages of protobuf, with the sensors' stamps."""
     with path.open("wb") as file, Protobuf(file) as writer:
         for ns, topic, value in _messages():
             message = Struct()
@@ -98,7 +98,7 @@ def write_mcap_protobuf(path: Path) -> None:
 
 
 def write_ulog(path: Path) -> None:
-    """Write two topics by the format's description, which pyulog only reads anew."""
+    """Write two topics by the format's description, as pyulog cannot write new files."""
 
     def block(kind: bytes, content: bytes) -> bytes:
         return struct.pack("<H", len(content)) + kind + content
@@ -114,7 +114,7 @@ def write_ulog(path: Path) -> None:
 
 
 def write_matlab73(path: Path) -> None:
-    """Write what MATLAB's `save -v7.3` makes: a user's block, and HDF5 behind it."""
+    """Write a file as MATLAB's `save -v7.3` does: a user block, then HDF5."""
     with h5py.File(path, "w", userblock_size=512) as file:
         log = file.create_group("LOG")
         log.attrs["MATLAB_class"] = np.bytes_("struct")
@@ -147,7 +147,7 @@ def write_matlab73(path: Path) -> None:
 
 
 def write_hdf5(path: Path) -> None:
-    """Write data sets with their units, one of them compound, and words beside them."""
+    """Write data sets with units, one of them compound, and text."""
     with h5py.File(path, "w") as file:
         rows = np.zeros(TIME_s.size, dtype=[("T", "<f8"), ("note", "S4")])
         rows["T"] = TIME_s
@@ -158,7 +158,7 @@ def write_hdf5(path: Path) -> None:
 
 
 def write_matlab_objects(path: Path, version: str) -> None:
-    """Write a timetable, a table and a date beside plain vectors, and an object of another kind."""
+    """Write a timetable, a table, a date, plain vectors, and an object of another class."""
     with warnings.catch_warnings(action="ignore", category=DeprecationWarning):  # mat-io's
         matio, pandas = (importlib.import_module(name) for name in ("matio", "pandas"))
     rate_s = np.rint(1e9 * TIME_s).astype("timedelta64[ns]")

@@ -12,8 +12,11 @@ from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import Manoeuvre, PressureProfile
 from coupled.flight.pilot import ForceTable
 from coupled.flight.runfile import read_run
-from coupled.gap.effects.effect import apply
+from coupled.gap.effects.effect import Effect, apply
 from coupled.gap.effects.library import BY_NAME
+from coupled.gap.search.case import Case
+from coupled.gap.search.problem import Problem
+from coupled.gap.search.screen import Screen, Worth
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
 from tests.support.records import NOISE
@@ -22,8 +25,17 @@ from tests.support.rigs import BENCH, bench
 LONG_s = 40.0
 
 
+def starts_of(case: Case, effect: Effect) -> list[dict[str, float]]:
+    """Return where the fits of an effect start beside the nuisance parameters alone."""
+    problem = Problem(case)
+    root, every = problem.fit(()), np.full(len(case.outputs), 1e6)
+    screen = Screen(problem, problem.variances(root.rig))
+    found = screen.best(root, [effect], Worth(0.0, every))
+    return [start for one in found for start in one.starts]
+
+
 def pushes(seed: int, amplitude_N: float = 45.0) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return a pilot's force: holds of random size and length, with a sweep on top."""
+    """Return a pilot's force: holds of random size and length plus a sweep."""
     rng = np.random.default_rng(seed)
     t = np.arange(round(LONG_s * 120) + 1) / 120
     force = 0.2 * amplitude_N * np.sin(2 * np.pi * (0.1 + 0.0125 * t) * t) * (t < LONG_s - 3)
@@ -38,7 +50,7 @@ def pushes(seed: int, amplitude_N: float = 45.0) -> tuple[NDArray[np.float64], N
 
 
 def nominal_rig(flown: bool) -> Rig:
-    """Return the rig that a diagnosis is held against."""
+    """Return the nominal rig of a diagnosis."""
     if flown:
         return read_run("worst-case-t37")[0].rig
     table = {**BENCH, "frame_rate_Hz": 120.0}

@@ -1,4 +1,4 @@
-"""Logs, maps and tables made at random for each reader, and what an import may do with them.
+"""Random logs, maps and tables for each reader, and the permitted outcomes of an import.
 
 A case is made of a known motion. A variation that changes nothing must be read right; a fault in
 its rows must be refused, or read right; damaged bytes must be refused, or read as whole numbers
@@ -54,7 +54,7 @@ FORCE_N, PLACE_m, SPEED = 40.0, 0.03, 2.0
 
 @dataclass(frozen=True)
 class Motion:
-    """Rows of a log as they are written: the stamp, the force in N, the place in m.
+    """Rows of a log as written: the stamp, the force in N, the position in m.
 
     `when_s` is when the row was taken in truth. It is logged as well, as a height, so that an
     import shows which rows it took and where it put them.
@@ -79,7 +79,7 @@ class Motion:
 
 @dataclass(frozen=True)
 class Case:
-    """A log with its map, and what an import may do with it; `rows` is how many frames it has."""
+    """A log with its map and the permitted outcomes; `rows` is its number of frames."""
 
     name: str
     content: bytes
@@ -102,7 +102,7 @@ def _signals(time_s: Floats) -> tuple[Floats, Floats]:
 
 
 def with_a_fault(rng: np.random.Generator, motion: Motion) -> Motion:
-    """Return rows with a typical fault of loggers, with or without the map's key for it."""
+    """Return rows with a typical fault of loggers, with or without the key for it in the map."""
     fault = FAULTS[int(rng.integers(len(FAULTS)))]
     return fault(rng, motion)
 
@@ -188,7 +188,7 @@ def _maybe(rng: np.random.Generator, *remedies: str) -> tuple[str, ...]:
 
 
 def mapped(motion: Motion, names: Sequence[str], layout: str = "", more: str = "") -> str:
-    """Return the map of a log whose columns have these names: stamp, force, place, true time."""
+    """Return the map of a log with these column names: stamp, force, position, true time."""
     time, force, place, when = names
     clock = "\n".join(motion.clock)
     return (
@@ -200,7 +200,7 @@ def mapped(motion: Motion, names: Sequence[str], layout: str = "", more: str = "
 
 
 def damaged(rng: np.random.Generator, content: bytes) -> bytes:
-    """Return bytes that are cut, turned, filled or put in."""
+    """Return bytes that are cut, reversed, overwritten or inserted."""
     data = bytearray(content)
     for _ in range(int(rng.integers(1, 4))):
         place = int(rng.integers(len(data) + 1)) if data else 0
@@ -464,7 +464,7 @@ READERS = (*WRITERS, "map", "suggest")
 
 
 def make_case(reader: str, seed: int, number: int) -> Case:
-    """Return a case of a reader: of three, one is right, one has a fault, one is damaged."""
+    """Return a case of a reader: in turn valid, with a fault, damaged."""
     rng = np.random.default_rng([seed, list(WRITERS).index(reader), number])
     motion = moved(rng)
     kind = number % 3
@@ -613,7 +613,7 @@ def make_table(seed: int, number: int) -> tuple[str, bytes]:
 
 
 def outcome(reader: str, seed: int, number: int, folder: Path) -> str:
-    """Return what an import did with a case: right, read, refused; raises what it must not do."""
+    """Return the outcome of an import: right, read or refused; raises for any other."""
     with in_process(), warnings.catch_warnings(action="error"):
         if reader == "suggest":
             return _suggested(*make_table(seed, number), folder)
@@ -686,7 +686,7 @@ def _leaves(table: Any) -> Iterator[object]:
 
 
 def run(reader: str, cases: int, seed: int) -> tuple[Counter[str], list[str]]:
-    """Return how often each outcome came of a reader's cases, and a line for each fault."""
+    """Return the count of each outcome of a reader's cases, and a line for each fault."""
     counts, faults, number = Counter[str](), list[str](), 0
     while number < cases:
         done, last = _block(reader, seed, number, min(BLOCK, cases - number))
@@ -705,7 +705,7 @@ CONTAINED = frozenset(WRITERS) - {"csv"}  # read in a process of its own: its en
 
 
 def _block(reader: str, seed: int, first: int, count: int) -> tuple[list[tuple[str, str]], str]:
-    """Return the outcomes of some cases, and how the process ended, if before its time."""
+    """Return the outcomes of some cases, and how the process ended, if early."""
     reading_end, writing_end = os.pipe()
     process = os.fork()
     if process == 0:
@@ -739,7 +739,7 @@ def _work(reader: str, seed: int, first: int, count: int, pipe: int) -> None:
 
 
 def main(words: Sequence[str]) -> int:
-    """Print the counts of each reader, and the faults; return how many there were."""
+    """Print the counts of each reader and the faults; return the number of faults."""
     numbers = [int(word) for word in words if word.isdigit()]
     cases, seed = (numbers + [len(READERS) * 100, SEED][len(numbers) :])[:2]
     chosen = [word for word in words if word in READERS] or list(READERS)

@@ -1,4 +1,4 @@
-"""The rig's kernels as plain Python: nothing is compiled, so that a changed stage runs at once.
+"""The rig's kernels as plain Python: a changed stage runs without compilation.
 
 `interpret()` puts them in the compiler's place; it is for whoever imports the stages after it.
 A kernel reads the fields of a record as attributes, which numpy's records do not have: each is
@@ -35,7 +35,7 @@ def opened(record: Any) -> SimpleNamespace:
 
 
 def written_back(plain: SimpleNamespace, record: Any) -> None:
-    """Put what the attributes are now into the record that they were opened from."""
+    """Write the attributes back to their record."""
     for name in record.dtype.names:
         value = getattr(plain, name)
         if isinstance(value, SimpleNamespace):
@@ -104,7 +104,7 @@ def _carray(address: int, shape: int | tuple[int, ...], dtype: Any) -> Any:
 
 
 def interpret() -> None:
-    """Let the rig's kernels be plain Python from here on; those of other rooms stay compiled."""
+    """Make the rig's kernels plain Python from here on; kernels of other packages stay compiled."""
     bound = compiled.bound
 
     def plain_or(compiler: Function) -> Function:

@@ -1,4 +1,4 @@
-"""Fake loaders in processes of their own, over loopback, and flights with them."""
+"""Simulated loaders in separate processes, over loopback, and flights with them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ ROOT = Path(__file__).parents[2]
 
 @contextmanager
 def fake_loader(kind: str, **numbers: float) -> Iterator[tuple[int, subprocess.Popen[str]]]:
-    """Run a fake loader; yield its port and its process."""
+    """Run a simulated loader; yield its port and its process."""
     words = [f"{name}={value}" for name, value in numbers.items()]
     command = [sys.executable, "-m", "tests.support.fakeloader", kind, "0", *words]
     path = {**os.environ, "PYTHONPATH": str(ROOT)}

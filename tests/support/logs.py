@@ -57,5 +57,5 @@ def imported(
 
 
 def edited(row: int, line: str) -> str:
-    """Return the good log with another line in place of one."""
+    """Return the valid log with one line replaced."""
     return "\n".join([*LINES[:row], line, *LINES[row + 1 :]])

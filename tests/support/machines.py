@@ -1,4 +1,4 @@
-"""Stand-ins for measured machines: simulated by SciPy, by other laws and another integrator.
+"""Substitutes for measured machines: simulated by SciPy, with other laws and integrators.
 
 None of them uses a stage of the package; each is simulated far
 finer than it is recorded. Records are in the channels of a column; forces in N, deflections in m.
@@ -24,7 +24,7 @@ MASS_kg, DAMPING, STIFFNESS, CUBIC = 1.0, 3.0, 4000.0, 4.0e6  # of the oscillato
 
 
 def plain_rig(frame_rate_Hz: float, changes: Mapping[str, float], gradient: float = 0.0) -> Rig:
-    """Return a bench whose column is a mass with damping, and no more than `changes` say."""
+    """Return a bench whose column is a mass with damping, with `changes`."""
     schedule = "controls.column.schedule.total_gradient_N_per_m"
     host = "controls.column.compensation."
     given = {"basic_gradient_N_per_m": gradient, "bend_m_per_N": 0.0} | dict(changes)
@@ -45,7 +45,7 @@ def recorded(rate_Hz: float, **channels: Floats) -> Record:
 
 
 def broadband(rate_Hz: float, seconds: float, to_Hz: float, rng: np.random.Generator) -> Signal:
-    """Return a force of unit rms, as strong at every frequency up to `to_Hz`; random phases."""
+    """Return a force of unit RMS with a flat spectrum up to `to_Hz` and random phases."""
     lines_Hz = np.arange(1, int(to_Hz * seconds)) / seconds
     phases = rng.uniform(0.0, 2.0 * np.pi, len(lines_Hz))
     times = np.arange(round(8 * rate_Hz * (seconds + 1.0))) / (8 * rate_Hz)
@@ -181,7 +181,7 @@ def damper(
 
 
 def damper_rig(damping: float = 2000.0, drive: str = "displacement") -> Rig:
-    """Return the rig of that damper, without play; of next to no mass."""
+    """Return the rig of that damper, without play and nearly without mass."""
     rig = plain_rig(100.0, {"mass_kg": 0.01, "damping_N_s_per_m": damping})
     return rig.changed({"controls.column.drive": drive})
 
@@ -231,9 +231,9 @@ def sprung(
     noise: tuple[float, float] = (0.05, 5e-6),
     seed: int = 5,
 ) -> Record:
-    """Return a record of a mass on a spring, whose dry friction goes with time as `friction` says.
+    """Return a record of a mass on a spring with a dry `friction` that depends on time.
 
-    2 kg, 40 N·s/m and 1000 N/m; tanh of the speed over 0.3 mm/s rubs; scipy's LSODA.
+    2 kg, 40 N·s/m and 1000 N/m; Friction is tanh of the speed over 0.3 mm/s; scipy's LSODA.
     """
     rng = np.random.default_rng(seed)
     times = np.arange(round(seconds * rate_Hz)) / rate_Hz

@@ -45,7 +45,7 @@ def rigs() -> dict[str, tuple[Rig, float]]:
 
 
 def force(rig: Rig, level_N: float) -> np.ndarray:
-    """Return the pilot's force on the twin's nodes, N: a sweep of 0.1 to 2 Hz between two rests."""
+    """Return the pilot's force at the twin's nodes, N: a sweep of 0.1 to 2 Hz between two rests."""
     nodes = round(DURATION_s * rig.frame_rate) * NODES + 1
     t = np.linspace(0.0, DURATION_s, nodes)
     rate = np.log(20.0) / (DURATION_s - 4.0)
@@ -77,7 +77,7 @@ def make(rig: Rig, level_N: float, seed: int) -> Record:
 
 
 def main() -> None:
-    """Write each record and its rig file beside each other."""
+    """Write each record and its rig file."""
     for seed, (name, (rig, level_N)) in enumerate(rigs().items()):
         text = rig_text(rig, f"The rig of {name}.parquet, made by make_records.py")
         (HERE / f"{name}.toml").write_text(text, encoding="utf-8")

@@ -1,4 +1,4 @@
-"""Copies of packaged JSBSim models with a number of their aerodynamics edited by hand."""
+"""Copies of packaged JSBSim models with edited aerodynamics."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def edited_model(
 
 
 def multiplied(factors: Mapping[str, float]) -> Callable[[ET.Element], None]:
-    """Return an edit that multiplies the products of functions, by the ends of their names."""
+    """Return an edit that scales functions, selected by the ends of their names."""
 
     def edit(aerodynamics: ET.Element) -> None:
         for end, factor in factors.items():

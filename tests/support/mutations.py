@@ -87,7 +87,7 @@ WORDS: tuple[bytes, ...] = (
 
 
 def write_inputs(folder: Path) -> None:
-    """Write the valid files that the commands of `cases` read."""
+    """Write the valid input files of the commands of `cases`."""
     for name, content in _inputs().items():
         (folder / name).parent.mkdir(exist_ok=True)
         (folder / name).write_bytes(content)

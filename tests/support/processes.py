@@ -1,4 +1,4 @@
-"""Commands begun in the background, to be stopped or killed while they work."""
+"""Commands started in the background, to be stopped or killed at work."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def begun(
     script: str = "",
     may_end: bool = False,
 ) -> subprocess.Popen[bytes]:
-    """Return a command, or a script, in its own group of processes, once it has come so far."""
+    """Start a command or a script in its own process group; return it once it has made progress."""
     process = subprocess.Popen(
         [sys.executable, *(["-c", script] if script else ["-m", "coupled", *words])],
         cwd=folder,
@@ -37,20 +37,20 @@ def begun(
 
 
 def stopped(process: subprocess.Popen[bytes], number: int) -> int:
-    """Send a command, and no worker of its, a signal; return its exit code."""
+    """Send a signal to a command but not to its workers; return its exit code."""
     process.send_signal(number)
     return process.wait(PATIENCE_s)
 
 
 def kill(process: subprocess.Popen[bytes]) -> None:
-    """Kill a command that has no time to clean up; its workers must end with it."""
+    """Kill a command without time to clean up; its workers must end with it."""
     os.kill(process.pid, signal.SIGKILL)
     process.wait()
     ended(process)
 
 
 def ended(process: subprocess.Popen[bytes]) -> None:
-    """Wait until nothing of a command's group of processes is left."""
+    """Wait until all processes of a command's group have ended."""
     patience = time.monotonic() + PATIENCE_s
     while True:
         try:

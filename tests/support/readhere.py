@@ -1,4 +1,4 @@
-"""Imports that read every format in this process, without a process for each log."""
+"""Imports that read each format in this process, without a process for each log."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from coupled.record.importing.mapping import Layout
 
 
 def _here(path: Path, content: bytes, kind: str, layout: Layout) -> tuple[Any, tuple[str, ...]]:
-    """Read a log in this process; what its reader raises ends another process in an import."""
+    """Read a log in this process; in an import its exception would end the separate process."""
     if kind == "mat" and separate.is_hdf5(content):
         kind = "hdf5"
     task = separate.Task(kind, str(path), layout.matrix, layout.names, layout.missing)
@@ -49,7 +49,7 @@ def _parquet_here(path: Path, content: bytes) -> tuple[dict[str, pl.Series], tup
 
 @contextmanager
 def in_process() -> Iterator[None]:
-    """Let imports read every format in this process: each process of its own takes a second."""
+    """Let imports read each format in this process, as a separate process takes a second."""
     with (
         patch.object(reading, "read_separately", _found_here),
         patch.object(reading, "read_parquet_separately", _parquet_here),

@@ -1,7 +1,7 @@
-"""Records made by another program than the library, and the noise of their sensors.
+"""Reference records, and the noise of their sensors.
 
-Those of the twin come with the project (tests/support/make_records.py). Three more, made by a
-separate program from the rig's description, lie beside the project where it was founded.
+Those of the independent twin are in the repository (tests/support/make_records.py). Three more,
+made by a separate program from the rig's description, are used if they lie in `../shared/rig`.
 """
 
 from __future__ import annotations
@@ -40,12 +40,12 @@ BY_TWIN = ("twin-bench", "twin-c172p")
 
 
 def available() -> list[str]:
-    """Return the names of the records that this machine has."""
+    """Return the names of the available records."""
     return [OWN, *BY_TWIN, *(RECORDS if FOUNDERS.is_dir() else [])]
 
 
 def reference(name: str) -> tuple[Rig, Record]:
-    """Return a record made by another program, and the rig that it is of."""
+    """Return a reference record and its rig."""
     if name in BY_TWIN:
         return read_rig(TWINS / f"{name}.toml"), read_record(TWINS / f"{name}.parquet")
     rig = read_rig(FOUNDERS / "rigs" / f"{RECORDS[name]}.toml")

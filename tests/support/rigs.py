@@ -53,12 +53,12 @@ def bench(changes: dict[str, Any] | None = None, table: dict[str, Any] = BENCH) 
 
 
 def amounts(most: float) -> SearchStrategy[float]:
-    """Return a strategy for nought, or an amount that a rig may have, up to `most`."""
+    """Return a strategy for 0 or a positive number up to `most`."""
     return st.just(0.0) | st.floats(1e-9 * most, most)
 
 
 def push(rig: Rig, force: Any, seconds: float, gradient: float = 560.0) -> NDArray[np.float64]:
-    """Return δc at 2 kHz, from rest, while `force` pushes: a constant, or of time."""
+    """Return δc at 2 kHz, from rest, under `force`: a constant, or a time history."""
     fine = rig.changed({"frame_rate_Hz": 2000.0})
     frames = round(seconds * fine.frame_rate)
     times = np.arange(frames * fine.substeps + 1) / (fine.frame_rate * fine.substeps)

@@ -42,7 +42,7 @@ ramp_s = 1.0
 
 
 def shortened(run: str, controls: int, frames: int) -> Manoeuvre:
-    """Return a shipped run with its first controls only, of so many frames."""
+    """Return a shipped run with its first controls and a number of frames."""
     scenario = read_run(run)[0]
     names = list(scenario.rig.controls)[:controls]
     rig = scenario.rig.changed({"controls": {name: scenario.rig.controls[name] for name in names}})

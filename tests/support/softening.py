@@ -1,6 +1,6 @@
 """The flight in which the structure softens by 40 %, with a fixed and with an adapted K̂.
 
-`python -m tests.support.softening` draws it anew into docs/softening.png.
+`python -m tests.support.softening` draws docs/softening.png.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ SOFTENS_s, TIMES, END_s = 30.0, 1.4, 90.0
 NOISE = {"column_force_N": 0.2, "column_computed_m": 2e-5, "column_deflection_m": 2e-5}
 
 
-class Saboteur:
+class StructureSoftening:
     """Changes the structure's K in flight."""
 
     def __init__(self, at_s: float, bend: float) -> None:
@@ -40,14 +40,14 @@ class Saboteur:
         return [Request("set", "bend", "column", self._bend)]
 
     def close(self) -> None:
-        """Nothing is open."""
+        """Do nothing."""
 
 
 def softened(adapt: bool) -> Record:
-    """Fly the report's column through a sweep of 40 N, softening on the way."""
+    """Fly the report's column through a sweep of 40 N; its structure softens in flight."""
     rig = load_rig("report-column").changed({"noise": NOISE})
     sweep = FrequencySweep(force_N=40, duration_s=END_s - 2.0, low_Hz=0.2, high_Hz=0.6)
-    saboteur = Saboteur(SOFTENS_s, TIMES * rig.controls["column"].loader.bend)
+    saboteur = StructureSoftening(SOFTENS_s, TIMES * rig.controls["column"].loader.bend)
     plan = Plan(paced=False, adapt=adapt, watchers=[saboteur])
     return fly_live(Manoeuvre(rig, {"column": sweep}, END_s), plan).record
 

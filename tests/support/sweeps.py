@@ -1,4 +1,4 @@
-"""A sweep of nine pushes in two configurations, planned, flown and counted."""
+"""A sweep of nine pushes in two configurations."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ steps = 3
 
 
 def write_sweep(folder: Path) -> Path:
-    """Write the runs and the sweep of them into a folder."""
+    """Write the runs and their sweep to a folder."""
     (folder / "push.toml").write_text(PUSH)
     (folder / "short.toml").write_text(SHORT)
     (folder / "s.toml").write_text(GRID)

@@ -45,6 +45,6 @@ def stepped(seconds: float, size_N: float = STEP_N) -> Floats:
 
 
 def loop(seconds: float, size_N: float) -> Floats:
-    """Return a slow force to one side, to the other and back, N: a triangle of one period."""
+    """Return a slow force in N: one period of a triangle."""
     t = nodes(seconds) / seconds
     return size_N * np.interp(t, [0.0, 0.25, 0.75, 1.0], [0.0, 1.0, -1.0, 0.0])

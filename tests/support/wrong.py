@@ -72,7 +72,7 @@ def damaged(table: Any, rng: random.Random, values: tuple[Any, ...] = PLAIN) -> 
 
 
 def unexpected(error: BaseException) -> str:
-    """Return how an error would look to a user; empty for a refusal, which is one line."""
+    """Return an unexpected error as shown to a user; empty for a refusal in one line."""
     if isinstance(error, (coupled.InputError, TypeError)):
         text = str(error)
         return "" if text and "\n" not in text else f"not a line: {text!r}"
@@ -113,7 +113,7 @@ def damaged_xml(text: bytes, rng: random.Random) -> bytes:
 
 
 def _torn(text: bytes, rng: random.Random) -> bytes:
-    """Return XML that is no longer XML, or says another encoding."""
+    """Return text that is no longer XML, or declares another encoding."""
     at = rng.randrange(len(text))
     encodings = (b"utf-16", b"no-such", b"utf-7", b"cp037", b"big5")
     head = b'<?xml version="1.0" encoding="%s"?>\n' % rng.choice(encodings)

@@ -1,4 +1,4 @@
-"""A twin's dry friction that yields before it slips, swept over friction and presliding.
+"""Diagnoses of a twin's presliding friction, over friction and presliding length.
 
 `python -m tests.support.yielding` prints a table: what each is named, how sure, and how far off
 the friction is. `--laws` has LuGre's bristles too, and the elastoplastic ones of three shares.
@@ -28,7 +28,7 @@ LONGEST_s = 30.0
 
 @dataclass(frozen=True)
 class Case:
-    """A friction, N, and the length by which its contact yields, m; the share of it is elastic."""
+    """A friction in N, a presliding length in m, and its elastic share."""
 
     friction_N: float
     travel_m: float
@@ -36,7 +36,7 @@ class Case:
 
 
 def cases() -> list[Case]:
-    """Return every friction at every length, the elastic share going round."""
+    """Return each friction at each length, with the elastic shares in turn."""
     return [
         Case(friction, travel, SHARES[(i + j) % len(SHARES)])
         for i, friction in enumerate(FRICTIONS_N)

@@ -81,12 +81,12 @@ def growth(rig: Rig, hand: Hand) -> float:
     return float(map_growth(frame_map(matrix, control, 1.0 / rig.frame_rate), 1.0 / rig.frame_rate))
 
 
-def growths(posed: Sequence[tuple[Rig, Hand]]) -> list[float]:
+def growths(cases: Sequence[tuple[Rig, Hand]]) -> list[float]:
     """Return the growths of linear rigs, 1/s; hybrid ones in one call, which is faster."""
-    found = [next(iter(rig.controls.values())).loader.multiplier for rig, _ in posed]
-    matrices = [motion_matrix(rig, hand) for rig, hand in posed if set(found) == {"hybrid"}]
+    found = [next(iter(rig.controls.values())).loader.multiplier for rig, _ in cases]
+    matrices = [motion_matrix(rig, hand) for rig, hand in cases if set(found) == {"hybrid"}]
     if not matrices or len({matrix.shape for matrix in matrices}) > 1:
-        return [growth(rig, hand) for rig, hand in posed]
+        return [growth(rig, hand) for rig, hand in cases]
     rates: list[float] = poles_growth(np.stack(matrices)).tolist()
     return rates
 

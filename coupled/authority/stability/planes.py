@@ -122,7 +122,7 @@ def linear_rig(
     The rig may be one that cannot be built, such as one with a gradient stiffer than the structure.
     The rig's own values are checked against their own bounds only.
     """
-    return _asked(_linear(rig, name, gradient), name, question)
+    return _with_values(_linear(rig, name, gradient), name, question)
 
 
 def _linear(rig: Rig, name: ControlName, gradient: float) -> Rig:
@@ -161,7 +161,7 @@ def _linear(rig: Rig, name: ControlName, gradient: float) -> Rig:
     return changed(rig, whole, rig.name)
 
 
-def _asked(linear: Rig, name: ControlName, question: Question) -> Rig:
+def _with_values(linear: Rig, name: ControlName, question: Question) -> Rig:
     """Return a linear rig with the values of a question.
 
     A plane has thousands of them, all within valid bounds, so none is checked again.
@@ -213,7 +213,7 @@ class Along:
         """The linear rig with its own values."""
         return _linear(self.rig, self.name, self.gradient)
 
-    def posed(self, value: float) -> tuple[Rig, Hand]:
+    def linear_with(self, value: float) -> tuple[Rig, Hand]:
         """Return the linear rig and hand at a value of the second quantity."""
         control, hand = self.rig.controls[self.name], Hand()
         bend, loader = control.loader.bend, control.loader
@@ -230,15 +230,15 @@ class Along:
             question = Question("hybrid", gauge_frequency_Hz=own_Hz or GAUGE_Hz, gauge_mass=mass)
         else:
             question, hand = Question("hybrid"), Hand(value / bend)
-        return _asked(self.linear, self.name, question), hand
+        return _with_values(self.linear, self.name, question), hand
 
     def simulated(self, value: float) -> float:
         """Return the growth found in simulation, 1/s."""
-        return simulated_growth(*self.posed(value), _SIMULATED_s)
+        return simulated_growth(*self.linear_with(value), _SIMULATED_s)
 
     def theory(self, value: float) -> float:
         """Return the growth by linear theory, 1/s."""
-        return linear_growth(*self.posed(value))
+        return linear_growth(*self.linear_with(value))
 
 
 def axis(kind: Kind, points: int) -> Floats:
@@ -267,7 +267,7 @@ def plane(rig: Rig, name: ControlName, kind: Kind) -> Plane:
 
 def _by_theory(rig: Rig, name: ControlName, kind: Kind, gradients: Floats, ys: Floats) -> Floats:
     along = [Along(rig, name, kind, gradient) for gradient in gradients.tolist()]
-    return np.array([growths([at.posed(y) for y in ys.tolist()]) for at in along])
+    return np.array([growths([at.linear_with(y) for y in ys.tolist()]) for at in along])
 
 
 def simulated_along(

@@ -98,16 +98,19 @@ class Stability(TableResult):
         )
 
 
-def bending(rig: Rig, control: str | None = None, asked_as: str = "control") -> list[ControlName]:
+def compliant_controls(
+    rig: Rig, control: str | None = None, key: str = "control"
+) -> list[ControlName]:
     """Return the controls that bend, of one or of all.
 
-    Raises InputError, which names the control `asked_as`, where the rig lacks it, or none bends.
+    Raises InputError, which names the control `key`, where the rig lacks it, or none bends.
     """
     file = rig.file or Path(rig.name)
+    rig.check_controlled(file)
     names = [name for name in rig.controls if control in (None, name)]
     if not names:
         problem = f"no {control!r}; {nearest(str(control), rig.controls)}"
-        raise InputError(file, asked_as, problem)
+        raise InputError(file, key, problem)
     bent = [name for name in names if rig.controls[name].loader.bend > 0.0]
     if not bent:
         key = f"controls.{names[0]}.loader.bend_{unit_of(names[0])}_per_N"

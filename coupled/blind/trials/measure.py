@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from coupled.gap.effects.library import BY_NAME
-from coupled.gap.search.fit import fit
+from coupled.gap.search.fit import fit_alone
 from coupled.gap.signals.output import Output
 from coupled.gap.stages.airframe import airframe_outputs
 from coupled.gap.stages.stages import Reader
@@ -46,6 +46,6 @@ def alike(rig: Rig, record: Record, effect: str) -> tuple[str, ...]:
     ours = [output for output in outputs if output.stage == "schedule"]
     left = {}
     for name in (effect, SAME_LAW[effect]):
-        found = fit(rig, "column", ours, [BY_NAME[name]])
+        found = fit_alone(rig, "column", ours, [BY_NAME[name]])
         left[name] = max(output.gap(found.rig) for output in ours)
     return (SAME_LAW[effect],) if left[SAME_LAW[effect]] - left[effect] < ALIKE else ()

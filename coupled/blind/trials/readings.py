@@ -11,9 +11,10 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from coupled.blind.trials.measure import outputs_of
 from coupled.blind.trials.truth import Reading
-from coupled.gap.effects.library import BY_NAME, ONE_LAW
+from coupled.gap.effects.library import BY_NAME
 from coupled.gap.search.case import Case
-from coupled.gap.search.gain import likelier_by
+from coupled.gap.search.evidence import likelier_by
+from coupled.gap.search.problem import Problem
 from coupled.gap.thresholds import RIVAL_GAIN
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
@@ -27,8 +28,15 @@ SAME = {
     ("asymmetric_friction",): ((PLAIN, "force_offset"), (YIELDS, "force_offset")),
     (PLAIN, "force_offset"): (("asymmetric_friction",), (YIELDS, "force_offset")),
 }
-# Laws equivalent in a limit that a record may not leave; a contact may be stiff, too.
-NEAR = (*ONE_LAW, ("backlash", "soft_backlash"))
+# Laws equivalent in a limit that a record may not leave: a rig that does not bend, a short lag, a
+# lift that is all of the angle of attack, a stiff contact.
+NEAR = (
+    ("force_zero", "force_offset"),
+    ("force_skew", "transport_delay"),
+    ("viscous_damping", "modifying_lag"),
+    ("mass", "lift_slope"),
+    ("backlash", "soft_backlash"),
+)
 # Laws with their simpler law, which is right if a record shows nothing of the difference: a mode
 # far above the pilot's frequencies is a bend, and a short dead time is a slower servo.
 PLAINER = (
@@ -83,8 +91,8 @@ def not_distinguished(
         here = [n for n in effects if shown & {*BY_NAME[n].shows_in}]
         outputs = outputs_of(rig, record, "airframe" in shown)
         case = Case(rig, "column", [o for o in outputs if o.stage in shown])
-        right = case.fit([BY_NAME[n] for n in here], start=start)
-        wrong = case.fit([BY_NAME[other if n == name else n] for n in here])
+        right = Problem(case).fit([BY_NAME[n] for n in here], start)
+        wrong = Problem(case).fit([BY_NAME[other if n == name else n] for n in here])
         if likelier_by(case.outputs, right, wrong) < RIVAL_GAIN:
             yield reading({other, *effects} - {name}, sure=sure)
 

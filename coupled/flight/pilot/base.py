@@ -87,6 +87,11 @@ class Pilot(Given):
         raise NotImplementedError
 
     @property
+    def title(self) -> str:
+        """The pilot's name for a reader."""
+        return type(self).__name__
+
+    @property
     def rests(self) -> bool:
         """Whether this pilot leaves the control alone."""
         return False

@@ -6,15 +6,14 @@ stages then fly.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from math import hypot
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 from coupled.errors import InputError
 from coupled.gap.chain import BY_NAME as STAGE_OF
-from coupled.gap.effects.likeness import Likeness
 from coupled.gap.signals.output import Floats, Output
 from coupled.gap.thresholds import MODEL_ERROR
 from coupled.record.channels import ControlName, channel, unit_of
@@ -42,8 +41,8 @@ class Parameter:
     that `may_end` can stand at a bound while the effect is there. `host` is what the host calls
     its own number for it, which is then to be set. A frequency `folds` about half of the frame
     rate. One that `saturates` does all that it can from some size on: a play wider than a motion.
-    `beyond` names the quantity whose noise a loop has to be wider than: it would smooth
-    that noise alone. One with a `tolerance`, relative, is off by so much without being there.
+    One with a `tolerance`, relative for a factor, is off by so much without being there: it is a
+    nuisance parameter.
     `model_error` is how well, relative, the physics of a right effect gives it, `unsure` by
     how much it is off at most for what a record does not say.
     """
@@ -65,7 +64,6 @@ class Parameter:
     host: str = ""
     folds: bool = False
     saturates: bool = False
-    beyond: str = ""
     tolerance: float = 0.0
 
     def named(self, control: str) -> str:
@@ -137,27 +135,33 @@ class Signature:
     zoom_s: float = 2.5
 
 
+OTHER_FORCE = "another control's force"
+
+
+class Sampled(NamedTuple):
+    """What a record holds of an effect that is random.
+
+    `error` is the relative standard error of its number as an estimate of the process', by the
+    record and its frame in s; `times` are those of the events that it consists of, in s from the
+    record's start, None where it is continuous.
+    """
+
+    error: Callable[[Record, float], float]
+    times: Callable[[Record], Floats] | None = None
+
+
 @dataclass(frozen=True)
 class Effect:
     """A named effect of one stage.
 
     `outputs`      those in which it shows, if not those of its stage
-    `needs`        channels that every record must have for it to be tried
-    `other`        whether every record must have another control's force
-    `tolerance`    relative; its number is a setting, off by so much without being an effect
-    `alike`        the effect for which it passes in a faint gap
-    `dry`          it is dry friction: how far its contact yields is a setting beside it
-    `yielding`     the effect that it is where its contact is seen to yield
-    `swallows`     settings, by the effects that free the same numbers, that are the same law
-    `even`         two effects, friction and a force, that together are the same law
-    `sample_error` relative standard error of its number, from what little of it a record meets
-    `gradual`      its first number is a rate: it grows from the first on
-    `events`       when the events were that it consists of, in s from the record's start
+    `needs`        channels that every record must have for it to be tried; `OTHER_FORCE` is that
+                   of another control
+    `dry`          it is dry friction: its presliding is a nuisance parameter beside it
+    `sampled`      a record holds a random sample of it
     `seen`         values by parameter where a fit may start, as a rig's residuals show them
-    `mark`         the output that shows it by what it repeats, be it within its limit
     `of_sensor`    it is one of the sensor of δc, which a set point has none of
-    `reserve`      it passes for others: only tried in a second search (`search`)
-    `contains`     the laws that it is at some value of a further parameter (`beam`)
+    `contains`     the laws that it is at some value of a further parameter
     """
 
     name: str
@@ -166,20 +170,10 @@ class Effect:
     signature: Signature
     outputs: tuple[str, ...] = ()
     needs: tuple[str, ...] = ()
-    other: bool = False
-    tolerance: float = 0.0
-    alike: Likeness | None = None
     dry: bool = False
-    yielding: str = ""
-    swallows: tuple[str, ...] = ()
-    even: tuple[str, str] | None = None
-    sample_error: Callable[[Record, float], float] | None = None
-    gradual: bool = False
-    events: Callable[[Record], Floats] | None = None
+    sampled: Sampled | None = None
     seen: Callable[[Sequence[Output], Rig, ControlName], list[dict[str, float]]] | None = None
-    mark: str = ""
     of_sensor: bool = False
-    reserve: bool = False
     contains: tuple[str, ...] = ()
 
     @property
@@ -192,16 +186,20 @@ class Effect:
         """The outputs in which it shows."""
         return self.outputs or STAGE_OF[self.stage].effects_show_in
 
+    @property
+    def gradual(self) -> bool:
+        """Whether its first number is a rate: it grows from the record's start on."""
+        return bool(self.free) and self.free[0].name == "per_s"
+
     def value_key(self, parameter: Parameter) -> str:
         """Return the key of a parameter among fitted values."""
         return f"{self.name}.{parameter.name}"
 
     def can_be_tried(self, records: Sequence[Record], control: ControlName) -> bool:
         """Tell whether all records of a control have the channels that it needs."""
-        if not all(name in record for record in records for name in self.needs):
-            return False
         others = [channel(name, "force") for name in leaking(control)]
-        return not self.other or all(any(n in record for n in others) for record in records)
+        wanted = [others if name == OTHER_FORCE else [name] for name in self.needs]
+        return all(any(n in record for n in names) for record in records for names in wanted)
 
 
 @cache
@@ -263,6 +261,38 @@ def possible(
         return apply(rig, control, effects, values)
     except InputError:
         return None
+
+
+def touched(outputs: Sequence[Output], effects: Iterable[Effect]) -> list[Output]:
+    """Return the outputs that these effects act on."""
+    stages = {stage for effect in effects for stage in effect.shows_in}
+    return [output for output in outputs if output.stage in stages]
+
+
+def contains(law: Effect, other: Effect) -> bool:
+    """Tell whether a law contains another."""
+    return other.name in law.contains
+
+
+def keys_of(effects: Iterable[Effect]) -> set[str]:
+    """Return the keys of a rig file that effects free."""
+    return {p.key for effect in effects for p in effect.parameters}
+
+
+def distinct(library: Sequence[Effect], nuisances: Iterable[Effect]) -> list[Effect]:
+    """Return the laws that are not another one beside its nuisance parameters.
+
+    Dry friction yields before it slips, and how far is a nuisance parameter where the rig file does
+    not give it: presliding friction is Coulomb friction then.
+    """
+    free = keys_of(nuisances)
+    return [
+        law
+        for law in library
+        if not any(
+            contains(law, other) and keys_of([law]) - keys_of([other]) <= free for other in library
+        )
+    ]
 
 
 def dotted(key: str, control: str) -> str:

@@ -74,6 +74,6 @@ def setting_of(
     A `wide` one is fitted to all outputs in which it shows, which are then fitted together.
     """
     (number,) = effect.parameters
-    within = replace(number, low=low, high=high, starts=(neutral,))
+    within = replace(number, low=low, high=high, starts=(neutral,), tolerance=0.0)
     name, shown = f"setting of {effect.name}", effect.shows_in[: None if wide else 1]
-    return replace(effect, name=name, parameters=(within,), outputs=shown, tolerance=0.0)
+    return replace(effect, name=name, parameters=(within,), outputs=shown)

@@ -5,12 +5,10 @@ They are one another's nearest neighbours: each has a level, and differs in what
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 
 from coupled.gap.effects.effect import Effect, Parameter, Signature
-from coupled.gap.effects.likeness import Likeness
-from coupled.gap.thresholds import YIELDING_ERROR, FAINT_STRIBECK_d_per_s
+from coupled.gap.thresholds import YIELDING_ERROR
 
 _DRAWN = Signature("speed", "missing")
 
@@ -18,16 +16,6 @@ _DRAWN = Signature("speed", "missing")
 def _level(*starts_N: float) -> Parameter:
     """Return the running friction above the nominal one."""
     return Parameter("friction_N", "loader.friction_N", "added", 0, 60, starts_N)
-
-
-def _breaks_away(values: Mapping[str, float], nominal_N: float) -> dict[str, float]:
-    """Return a breakaway of twice the running friction, which hardly shows in a faint gap."""
-    running = values["friction_N"]
-    return {
-        "friction_N": running,
-        "breakaway_N": 2.0 * running + nominal_N,
-        "stribeck_{d}_per_s": FAINT_STRIBECK_d_per_s,
-    }
 
 
 _BREAKAWAY = Parameter("breakaway_N", "loader.breakaway_N", "value", 0, 200, (2.0, 3.0, 3.0))
@@ -56,11 +44,7 @@ def _one_way(name: str, *starts_N: float) -> Parameter:
 
 
 FRICTIONS: tuple[Effect, ...] = (
-    Effect(
-        *("coulomb_friction", "loader", (_level(1.5),), _DRAWN),
-        dry=True,
-        yielding="presliding_friction",
-    ),
+    Effect("coulomb_friction", "loader", (_level(1.5),), _DRAWN, dry=True),
     Effect(
         "stribeck_friction",
         "loader",
@@ -71,7 +55,6 @@ FRICTIONS: tuple[Effect, ...] = (
         ),
         _DRAWN,
         dry=True,
-        alike=Likeness("coulomb_friction", "loader.friction_N", _breaks_away),
         contains=("coulomb_friction", "presliding_friction"),
     ),
     Effect(
@@ -90,7 +73,6 @@ FRICTIONS: tuple[Effect, ...] = (
         (_one_way("pull_N", 1.5, 0.5), _one_way("push_N", 0.5, 1.5)),
         _DRAWN,
         dry=True,
-        even=("coulomb_friction", "force_offset"),
         contains=("coulomb_friction",),
     ),
     Effect(

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from coupled.gap.effects.effect import Effect
+from coupled.gap.effects.effect import Effect, Sampled
 from coupled.gap.effects.entries import added, factor, limit, one, setting_of, value
 from coupled.gap.effects.linkage import LINKAGE, without_servo
 from coupled.gap.effects.loader import LOADER
@@ -110,7 +110,7 @@ EFFECTS: tuple[Effect, ...] = (
             *("", "air", "time", 6.0),
         ),
         needs=AIR,
-        sample_error=spread_of_air,
+        sampled=Sampled(spread_of_air),
     ),
     one(
         "surface",
@@ -120,14 +120,6 @@ EFFECTS: tuple[Effect, ...] = (
     ),
 )
 BY_NAME = {effect.name: effect for effect in EFFECTS}
-# One law in a limit that a record may not leave: a rig that does not bend, a short lag, a lift that
-# is all of the angle of attack.
-ONE_LAW = (
-    ("force_zero", "force_offset"),
-    (STAMP, LAG),
-    ("viscous_damping", "modifying_lag"),
-    ("mass", "lift_slope"),
-)
 
 
 def library_of(rig: Rig, control: ControlName) -> list[Effect]:
@@ -150,10 +142,13 @@ def library_of(rig: Rig, control: ControlName) -> list[Effect]:
 def _ends(effect: Effect) -> tuple[float, float, float]:
     """Return between which values an effect's number is a setting, and its neutral one."""
     neutral = 1.0 if effect.free[0].mode == "factor" else 0.0
-    return neutral - effect.tolerance, neutral + effect.tolerance, neutral
+    tolerance = effect.free[0].tolerance
+    return neutral - tolerance, neutral + tolerance, neutral
 
 
 # {the effect that frees the same number: the setting}, where the rig file gives no tolerance
 SETTINGS: dict[str, Effect] = {
-    effect.name: setting_of(effect, *_ends(effect)) for effect in EFFECTS if effect.tolerance > 0.0
+    effect.name: setting_of(effect, *_ends(effect))
+    for effect in EFFECTS
+    if effect.free and effect.free[0].tolerance > 0.0
 }

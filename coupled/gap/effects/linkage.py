@@ -24,7 +24,6 @@ DAMPING_RATIO = replace(
     name="damping_factor",
     scanned=False,
     may_end=True,
-    tolerance=SETTING,
 )
 LINKAGE: tuple[Effect, ...] = (
     one("linkage", "bend", real_bend(5e-5), *("force", "bent")),
@@ -70,7 +69,6 @@ LINKAGE: tuple[Effect, ...] = (
             replace(
                 value("width_N", "loader.bend_hysteresis_width_N", 0, 500, 5.0, 1.0, 25.0),
                 scanned=False,
-                beyond="force",
             ),
         ),
         Signature("force", "bent", "loop", 6.0),
@@ -91,14 +89,11 @@ LINKAGE: tuple[Effect, ...] = (
         Signature("force", "bent", "loop", 1.5),
         contains=("bend",),
     ),
-    replace(
-        one(
-            "linkage",
-            "servo_lag",
-            factor(SERVO, 0.8),
-            *("speed", "deflection_left", "law", 0.8),
-        ),
-        tolerance=SETTING,
+    one(
+        "linkage",
+        "servo_lag",
+        replace(factor(SERVO, 0.8), tolerance=SETTING),
+        *("speed", "deflection_left", "law", 0.8),
     ),
     one(
         "linkage",
@@ -114,17 +109,14 @@ LINKAGE: tuple[Effect, ...] = (
     ),
     # A motor's torque, or the ramp of a servo's own profile: what asks for less is answered
     # as quickly as ever.
-    replace(
-        one(
-            "linkage",
-            "servo_acceleration_limit",
-            limit(
-                *("acceleration_{d}_per_s2", "loader.servo_acceleration_limit_{d}_per_s2"),
-                *(1e-2, 1e4, 30.0, 10.0),
-            ),
-            *("speed", "servo_speed", "law", 1.5),
+    one(
+        "linkage",
+        "servo_acceleration_limit",
+        limit(
+            *("acceleration_{d}_per_s2", "loader.servo_acceleration_limit_{d}_per_s2"),
+            *(1e-2, 1e4, 30.0, 10.0),
         ),
-        reserve=True,
+        *("speed", "servo_speed", "law", 1.5),
     ),
     # A servo that was fitted without its dead time is too slow: its frequency is found again, and
     # its damping ratio where that is worth one more number.
@@ -143,7 +135,6 @@ LINKAGE: tuple[Effect, ...] = (
                 *more,
             ),
             Signature("speed", "deflection_left", "law", 0.8),
-            reserve=True,
             contains=contains,
         )
         for name, more, contains in (
@@ -176,5 +167,5 @@ def without_servo(effects: Sequence[Effect]) -> list[Effect]:
         if SERVO not in keys:
             found.append(effect)
         elif effect.free and len(others) + 1 == len(keys):
-            found.append(replace(effect, parameters=others or (lag,), tolerance=0.0))
+            found.append(replace(effect, parameters=others or (lag,)))
     return found

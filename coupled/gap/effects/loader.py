@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from coupled.gap.effects.effect import Effect, Parameter, Signature
+from coupled.gap.effects.effect import OTHER_FORCE, Effect, Parameter, Signature
 from coupled.gap.effects.entries import SETTING, added, factor, limit, one, switch, value
 from coupled.gap.effects.frictions import FRICTIONS
-from coupled.gap.effects.ripples import ripples
-from coupled.gap.effects.stops import stops
+from coupled.gap.effects.seen import ripples, stops
 from coupled.gap.thresholds import CLOCK_s
 
 
@@ -20,23 +19,17 @@ def _stop(side: str) -> Parameter:
 
 LOADER: tuple[Effect, ...] = (
     *FRICTIONS,
-    replace(
-        one(
-            "loader",
-            "inertia",
-            factor("loader.mass_kg", 1.2),
-            *("acceleration", "missing", "law", 1.5),
-        ),
-        tolerance=SETTING,
+    one(
+        "loader",
+        "inertia",
+        replace(factor("loader.mass_kg", 1.2), tolerance=SETTING),
+        *("acceleration", "missing", "law", 1.5),
     ),
-    replace(
-        one(
-            "loader",
-            "viscous_damping",
-            factor("loader.damping_N_s_per_{d}", 1.2),
-            *("speed", "missing"),
-        ),
-        tolerance=SETTING,
+    one(
+        "loader",
+        "viscous_damping",
+        replace(factor("loader.damping_N_s_per_{d}", 1.2), tolerance=SETTING),
+        *("speed", "missing"),
     ),
     one(
         "loader",
@@ -76,25 +69,22 @@ LOADER: tuple[Effect, ...] = (
             *("noise", "product_left", "law", 0.3),
         ),
         outputs=("loader", "multiplier"),
-        mark="multiplier",
     ),
-    # Where nothing bends, a force that comes late is one that is stamped late.
-    replace(
-        one(
-            "loader",
-            "transport_delay",
-            replace(added("delay_s", "loader.delay_s", 0, 0.19, 0.01), unsure=CLOCK_s),
-            *("speed", "computed_left", "law", 1.0),
-        ),
-        swallows=("force_skew",),
+    one(
+        "loader",
+        "transport_delay",
+        replace(added("delay_s", "loader.delay_s", 0, 0.19, 0.01), unsure=CLOCK_s),
+        *("speed", "computed_left", "law", 1.0),
     ),
     Effect(
         "friction_ripple",
         "loader",
         (
             added("ripple_N", "loader.ripple_N", 0, 60, 1.0),
-            value("period_{d}", "loader.ripple_period_{d}", 2e-4, 0.5, 1e-2),
-            value("phase_rad", "loader.ripple_phase_rad", -7, 7, 1.0),
+            replace(
+                value("period_{d}", "loader.ripple_period_{d}", 2e-4, 0.5, 1e-2), scanned=False
+            ),
+            replace(value("phase_rad", "loader.ripple_phase_rad", -7, 7, 1.0), scanned=False),
         ),
         Signature("computed", "missing"),
         seen=ripples,
@@ -135,7 +125,7 @@ LOADER: tuple[Effect, ...] = (
             added("factor", "loader.crosstalk", -0.9, 0.9, 0.05),
             *("other_force", "missing"),
         ),
-        other=True,
+        needs=(OTHER_FORCE,),
     ),
     one(
         "loader",

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from coupled.gap.effects.effect import Effect, Parameter, Signature
+from coupled.gap.effects.effect import Effect, Parameter, Sampled, Signature
 from coupled.gap.effects.entries import added, exact, factor, one, value
-from coupled.gap.effects.hums import hums
+from coupled.gap.effects.seen import hums
 from coupled.gap.signals.missed import shares_missed, spread_of_missed, times_missed
 from coupled.gap.thresholds import CLOCK_s
 
@@ -25,9 +25,8 @@ COMPENSATION: tuple[Effect, ...] = (
             *("", "estimate_left", "time", 0.5),
         ),
         outputs=("schedule", "multiplier", "compensation"),
-        sample_error=spread_of_missed,
+        sampled=Sampled(spread_of_missed, times_missed),
         seen=shares_missed,
-        events=times_missed,
     ),
 )
 SENSING: tuple[Effect, ...] = (
@@ -66,7 +65,6 @@ SENSING: tuple[Effect, ...] = (
             added("per_s", "sensing.scale_drift_per_s", -0.05, 0.05, 1e-3),
             *("computed", "computed_left", "loop", 1e4),
         ),
-        gradual=True,
         of_sensor=True,
     ),
     Effect(
@@ -84,22 +82,18 @@ SENSING: tuple[Effect, ...] = (
         seen=hums,
         of_sensor=True,
     ),
-    replace(
-        _force(
-            "force_skew",
-            added("delay_s", "sensing.force_stamp_s", -0.3, 0.3, 0.01),
-            *("speed", "missing"),
-        ),
-        tolerance=CLOCK_s,
+    _force(
+        "force_skew",
+        replace(added("delay_s", "sensing.force_stamp_s", -0.3, 0.3, 0.01), tolerance=CLOCK_s),
+        *("speed", "missing"),
     ),
     replace(
         one(
             "sensing",
             "motion_skew",
-            added("delay_s", "flight.motion_stamp_s", -0.4, 0.4, 0.05),
+            replace(added("delay_s", "flight.motion_stamp_s", -0.4, 0.4, 0.05), tolerance=CLOCK_s),
             *("elevator", "pitch_rate", "loop", 4.0),
         ),
         outputs=("airframe",),
-        tolerance=CLOCK_s,
     ),
 )

@@ -96,7 +96,7 @@ def _ends(effect: Effect, rig: Rig, control: ControlName) -> tuple[float, float,
     if len(effect.free) != 1 or len(effect.parameters) != 1:
         return None
     (number,) = effect.free
-    tolerance = effect.tolerance
+    tolerance = number.tolerance
     wide = rig.controls[control].tolerance.get(number.key_on(control))
     if wide is None and tolerance <= 0.0:
         return None

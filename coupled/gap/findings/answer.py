@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
@@ -21,14 +21,21 @@ from coupled.gap.findings.result import (
 )
 from coupled.gap.noise.lines import other_side
 from coupled.gap.search.case import Case
-from coupled.gap.search.choose import Choice
-from coupled.gap.search.courses import course_in
-from coupled.gap.search.rivals import Found
+from coupled.gap.search.found import Choice, Found
+from coupled.gap.search.histories import course_in
 from coupled.gap.signals.output import Output
 from coupled.gap.stages.stages import Reader
-from coupled.gap.thresholds import CERTAIN, DOUBT, MOST, STATED_MOST, SURE, UNDERSTATED
+from coupled.gap.thresholds import (
+    CERTAIN,
+    DOUBT,
+    LIKELY,
+    MOST,
+    STATED_MOST,
+    SURE,
+    UNDERSTATED,
+    UNDETERMINED_MOST,
+)
 from coupled.record.channels import ControlName, unit_of
-from coupled.record.record import Record
 from coupled.rig.rig import Rig
 
 
@@ -42,8 +49,10 @@ def verdict_of(
 
     An effect without alternative that is not certain counts as unexplained, since it may imitate
     a fault outside the library. `mostly`: residual structure remains, but the certain effects hold
-    at least `MOST` of every faulty stage's gap, or of all gaps together. Alternatives do not make
-    the verdict `ambiguous` if none of them is credible and the certain effects hold that share.
+    at least `MOST` of every faulty stage's gap, or of all gaps together. With alternatives the
+    verdict is `ambiguous` if no set of effects has more than half of the probability, or an effect
+    that has them is not certain; but not if none of them is credible and the certain effects hold
+    that share.
     """
     guilty = [stage.name for stage in stages if stage.guilty]
     blamed = {step.effect.stage for step in choice.steps}
@@ -60,9 +69,10 @@ def verdict_of(
         # A stage within a large noise floor may hide a gap.
         return "ambiguous" if any(stage.hidden is not None for stage in stages) else "no_gap"
     rivals = {step.effect.name for step in choice.steps if step.rivals}
-    if rivals and not (held and sure and rivals <= incredible(choice, effects)):
+    open_rivals = rivals - sure if choice.probability > LIKELY else rivals
+    if open_rivals and not (held and sure and rivals <= incredible(choice, effects)):
         return "ambiguous"
-    return "mostly" if left or rivals else "effect"
+    return "mostly" if left or open_rivals else "effect"
 
 
 def doubted(choice: Choice, effects: Sequence[EffectResult]) -> frozenset[str]:
@@ -99,20 +109,24 @@ def _held_together(
 def settings_of(
     choice: Choice, rig: Rig, control: ControlName, outputs: Sequence[Output]
 ) -> tuple[SettingResult, ...]:
-    """Return the fitted nuisance parameters, each as a factor on its filed value."""
+    """Return the fitted nuisance parameters, each as a factor on its filed value.
+
+    Without effects they are within their tolerance, as the stages are judged then.
+    """
+    fit = choice.fit if choice.steps else choice.settled
     found = []
     for setting in settings(rig, control, outputs).values():
         for p in setting.free:
-            value = choice.fit.values.get(setting.value_key(p))
+            value = fit.values.get(setting.value_key(p))
             filed = p.nominal(rig, control) if value is not None else 0.0
             if value is not None and filed:
                 factor = float(p.entered(filed, value) / filed)
                 name = field_of(rig, control, p.key)
                 found.append(SettingResult(name, setting.stage, factor))
     length = next((one.value_key(one.free[0]) for one in contact(rig, control)), "")
-    if is_dry(rig, control) and length in choice.fit.values:
+    if is_dry(rig, control) and length in fit.values:
         name = f"friction_yields_{unit_of(control)}"
-        found.append(SettingResult(name, "loader", yields=choice.fit.values[length]))
+        found.append(SettingResult(name, "loader", yields=fit.values[length]))
     return tuple(found)
 
 
@@ -125,7 +139,8 @@ def effects_of(
     """Return the effects found, the largest log-likelihood gain first.
 
     The probability of an effect falls with its credibility. It is at most `STATED_MOST`, the share
-    of correct effects among the most probable ones.
+    of correct effects among the most probable ones, and at most `UNDETERMINED_MOST` if the interval
+    of its size contains the neutral value.
     """
     remains = {stage.name: stage.remainder for stage in stages}
     records = [reader.record for reader in readers]
@@ -137,11 +152,22 @@ def effects_of(
         sure = DOUBT + (SURE - DOUBT) * known.value
         scatter = _sample_error(effect, readers)
         numbers = tuple(_estimate(choice, effect, p, case, scatter) for p in effect.free)
-        probability = min(step.probability * sure, STATED_MOST)
+        most = STATED_MOST if has_size(effect, case, numbers) else UNDETERMINED_MOST
+        probability = min(step.probability * sure, most)
         course = course_in(effect, case, choice.fit, records)
         return EffectResult(effect.name, effect.stage, probability, numbers, known, course)
 
     return tuple(result(step) for step in sorted(choice.steps, key=lambda s: -s.gain))
+
+
+def has_size(effect: Effect, case: Case, numbers: Sequence[ParameterEstimate]) -> bool:
+    """Tell whether a size of an effect differs from its neutral value; a limit always does."""
+    sizes = [(p, one) for p, one in zip(effect.free, numbers, strict=True) if p.scanned]
+    for p, one in sizes:
+        none, low, high = p.neutral(case.nominal, case.control), one.low, one.high
+        if p.inverse or not (low is None or low <= none) or not (high is None or none <= high):
+            return True
+    return not sizes
 
 
 def _estimate(
@@ -183,8 +209,8 @@ def _sample_error(effect: Effect, readers: Sequence[Reader]) -> float:
 
     It is zero unless the parameter describes a random quantity.
     """
-    one: Callable[[Record, float], float] | None = effect.sample_error
-    if one is None:
+    if effect.sampled is None:
         return 0.0
-    each = [one(reader.record, 1.0 / reader.rig.frame_rate) for reader in readers]
+    error = effect.sampled.error
+    each = [error(reader.record, 1.0 / reader.rig.frame_rate) for reader in readers]
     return float(np.sqrt(np.sum(np.square(each)))) / len(each)

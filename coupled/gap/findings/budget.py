@@ -24,10 +24,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.gap.chain import BY_NAME as STAGE_OF
-from coupled.gap.effects.effect import Effect
+from coupled.gap.effects.effect import Effect, touched
 from coupled.gap.findings.shapley import shapley_weights
 from coupled.gap.search.case import Case
-from coupled.gap.search.fit import Fit, touched
+from coupled.gap.search.found import Fit
 from coupled.gap.signals.output import Output
 from coupled.gap.thresholds import BOOTSTRAPS
 

@@ -25,12 +25,12 @@ from typing import Any
 
 from scipy.special import ndtr
 
-from coupled.gap.effects.effect import Effect, Parameter, Signature, value_of
+from coupled.gap.effects.effect import Effect, Parameter, Signature, touched, value_of
 from coupled.gap.findings.flexible import free_share
 from coupled.gap.findings.regimes import Acts, Regime, regimes
 from coupled.gap.findings.where import response, signals
 from coupled.gap.search.case import Case
-from coupled.gap.search.fit import Fit, touched
+from coupled.gap.search.found import Fit
 from coupled.gap.thresholds import (
     DRIFT,
     DRIFT_CHANCE,

@@ -12,13 +12,14 @@ from coupled.gap.findings.changed import Comparison
 from coupled.gap.findings.flown import Again, ChannelAgain, closed_loop, nearer
 from coupled.gap.findings.healthy import Baseline
 from coupled.gap.findings.inflight import EffectInFlight, in_flight, in_words
+from coupled.gap.findings.inseparable import Alike
 from coupled.gap.findings.power import EffectPower, power
 from coupled.gap.findings.proposal import ProposedTest, in_one_line, next_tests
 from coupled.gap.findings.result import FORMAT, Findings
 from coupled.gap.findings.shrink import Shrink
 from coupled.gap.findings.summary import MISFIT, NOISE, filtered_words, summary
 from coupled.gap.search.case import Case
-from coupled.gap.search.choose import Choice
+from coupled.gap.search.found import Choice
 from coupled.gap.signals.output import Output
 from coupled.gap.signals.reading import worth_recording
 from coupled.record.channels import ControlName
@@ -29,7 +30,6 @@ from coupled.rig.rig import Rig
 if TYPE_CHECKING:
     import polars as pl
 
-CIRCLED = "The search stopped because it returned to an earlier set of effects."
 COLUMNS = ("effect", "stage", "probability", "key", "unit", "filed", "found", "low", "high")
 
 
@@ -54,6 +54,8 @@ class Diagnosis(Findings, TableResult):
     filtered: Mapping[str, str] = field(default_factory=dict)
     # What of live records is not judged, or judged with changes; a sentence each.
     left_out: tuple[str, ...] = ()
+    # Parameters of the effects found that the records determine only together.
+    inseparable: tuple[Alike, ...] = ()
     # What of the trim comes from the records or their manifests, in words; empty if nothing.
     trim: str = ""
 
@@ -138,7 +140,7 @@ class Diagnosis(Findings, TableResult):
         missed = self.baseline is not None and self.baseline.missed
         floor = MISFIT if missed else NOISE
         said = summary(self, self.shrink, flight, filtered, self.next_test, floor)
-        said += f" {CIRCLED}" if self.choice.circled else ""
+        said += "".join(f" Not distinguished: {one.words}." for one in self.inseparable)
         held = "" if self.baseline is None else self.baseline.words
         changed = "" if self.change is None else self.change.words
         return " ".join(
@@ -160,8 +162,8 @@ class Diagnosis(Findings, TableResult):
             "settings": {one.name: one.factor for one in self.settings if one.yields is None},
         }
         found |= {one.name: one.yields for one in self.settings if one.yields is not None}
-        if self.choice.circled:
-            found["circled"] = True
+        if self.inseparable:
+            found["inseparable"] = [one.as_dict() for one in self.inseparable]
         if self.filtered:
             found["filtered"] = dict(self.filtered)
         if self.left_out:

@@ -27,7 +27,8 @@ from coupled.gap.findings.changed import Comparison, compare
 from coupled.gap.findings.result import StageResult, Verdict
 from coupled.gap.noise.smooth import smoothed
 from coupled.gap.search.case import Case
-from coupled.gap.search.fit import Fit
+from coupled.gap.search.found import Fit
+from coupled.gap.search.problem import Problem
 from coupled.gap.signals.output import Hides, Output, Part
 from coupled.gap.thresholds import HEALTHY_ALONE, HEALTHY_SIGMAS
 from coupled.record.channels import ControlName
@@ -116,10 +117,10 @@ def tolerances(case: Case, found: Fit) -> dict[str, float]:
     numbers = sorted({output.record for output in case.outputs})
     if len(numbers) > 1:
         parts = [[o for o in case.outputs if o.record == n] for n in numbers]
-        fits = [replace(case, outputs=p).fit(found.effects, start=found.values) for p in parts]
+        fits = [Problem(replace(case, outputs=p)).fit(found.effects, found.values) for p in parts]
     else:
         halves: tuple[Part, ...] = ("fitted", "held")
-        fits = [case.fit(found.effects, half, found.values) for half in halves]
+        fits = [Problem(case).fit(found.effects, found.values, part=half) for half in halves]
     wide = {}
     for effect in found.effects:
         for p in effect.free:

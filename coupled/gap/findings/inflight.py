@@ -19,7 +19,7 @@ from coupled.display import percent
 from coupled.gap.findings.flown import Again
 from coupled.gap.findings.shapley import shapley_weights
 from coupled.gap.search.case import Case
-from coupled.gap.search.fit import Fit
+from coupled.gap.search.found import Fit
 from coupled.gap.stages.surfaces import surface_channel
 from coupled.gap.thresholds import IN_FLIGHT_LEAST
 from coupled.record.channels import ControlName

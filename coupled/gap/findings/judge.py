@@ -9,7 +9,7 @@ from coupled.gap.chain import BY_NAME as STAGE_OF
 from coupled.gap.chain import CHAIN, stage_of
 from coupled.gap.findings.result import StageResult
 from coupled.gap.findings.where import remains, where
-from coupled.gap.search.choose import Choice
+from coupled.gap.search.found import Choice
 from coupled.gap.signals.output import Hides, Output, explained_below, stage_gaps, stage_limits
 from coupled.gap.stages.airframe import needs
 from coupled.gap.stages.stages import Reader

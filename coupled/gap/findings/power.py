@@ -15,10 +15,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.gap.effects.effect import Effect, Parameter, apply, possible, value_of
+from coupled.gap.effects.effect import Effect, Parameter, apply, possible, touched, value_of
 from coupled.gap.effects.library import EFFECTS
 from coupled.gap.effects.settings import contact, settings
-from coupled.gap.search.fit import touched
 from coupled.gap.signals.output import Output
 from coupled.gap.thresholds import POWER_DECADES, POWER_HALVINGS, SETTING_NUDGE
 from coupled.record.channels import ControlName
@@ -83,7 +82,7 @@ def _values(effect: Effect, size: float, nominal: Rig, control: ControlName) -> 
             value = start
         elif p.mode == "factor":
             off = size * (start - 1.0)
-            value = 1.0 + math.copysign(max(abs(off), effect.tolerance), off)
+            value = 1.0 + math.copysign(max(abs(off), p.tolerance), off)
         elif p.inverse:
             value = start / size
         else:
@@ -125,7 +124,7 @@ def _settings(nominal: Rig, control: ControlName, output: Output, effect: Effect
     """Return the signatures of the stage's nuisance parameters, a column each."""
     columns = []
     known = settings(nominal, control, [output])
-    beside = [one for name, one in known.items() if name not in (effect.name, *effect.swallows)]
+    beside = [one for name, one in known.items() if name != effect.name]
     for setting in (*beside, *(contact(nominal, control) if effect.dry else ())):
         if output.stage in setting.shows_in:
             (number,) = setting.free

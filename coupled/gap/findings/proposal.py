@@ -1,8 +1,8 @@
 """The next test: the record that would discriminate two alternatives (T-optimal design).
 
 Each candidate test is simulated with one alternative, with noise. Both alternatives are fitted to
-the simulated record. The criterion is the log-likelihood gain of the true one over the other on
-held-out stretches.
+the simulated record, since without the fit any test would seem to separate them. The criterion is
+the log-likelihood gain of the true one over the other.
 """
 
 from __future__ import annotations
@@ -19,8 +19,9 @@ from coupled.gap.effects.effect import Effect, value_of
 from coupled.gap.effects.library import EFFECTS
 from coupled.gap.findings.flown import fly_force
 from coupled.gap.search.case import Case
-from coupled.gap.search.choose import Choice
-from coupled.gap.search.gain import ranked_by_gain
+from coupled.gap.search.evidence import likelier_by
+from coupled.gap.search.found import Choice
+from coupled.gap.search.problem import Problem
 from coupled.gap.signals.output import Output, white
 from coupled.gap.stages.airframe import airframe_outputs
 from coupled.gap.stages.stages import Reader
@@ -110,12 +111,8 @@ def _gain(
     if any(effect.stage == "airframe" for effect in pair[0] + pair[1]):
         outputs += airframe_outputs(test.rig, record)
     case = Case(test.rig, control, outputs)
-    fits = [case.fit(effects, "fitted", start) for effects in pair]
-    settled = case.fit((), "fitted")
-    fitted = [(effects[-1], found) for effects, found in zip(pair, fits, strict=True)]
-    ranked = ranked_by_gain(outputs, settled, fitted)
-    gains = {candidate.effect.name: candidate.gain for candidate in ranked}
-    return gains[pair[0][-1].name] - gains[pair[1][-1].name]
+    right, wrong = (Problem(case).fit(effects, start) for effects in pair)
+    return likelier_by(outputs, right, wrong)
 
 
 def pushes(nominal: Rig, record: Record, control: ControlName) -> Iterator[Push]:

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from coupled.gap.effects.effect import touched
 from coupled.gap.search.case import Case
-from coupled.gap.search.choose import Choice
-from coupled.gap.search.fit import Fit, touched
+from coupled.gap.search.found import Choice, Fit
 from coupled.gap.signals.output import Output
 from coupled.gap.thresholds import BOOTSTRAPS, FEW_STRETCHES
 from coupled.rig.rig import Rig

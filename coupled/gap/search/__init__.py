@@ -1,1 +1,1 @@
-"""The search: which effects, fitted as physics, the stages' residuals call for."""
+"""The search: sets of effects, fitted as physics, and compared by their evidence."""

@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import hypot
-from typing import Any
 
 import numpy as np
 
-from coupled.gap.effects.effect import Effect, possible
+from coupled.gap.effects.effect import Effect, possible, touched
 from coupled.gap.effects.library import LAG, STAMP
-from coupled.gap.effects.settings import contact, is_dry, lag_within_a_step, settings
+from coupled.gap.effects.settings import contact, lag_within_a_step, settings
 from coupled.gap.search.contact import contact_start
-from coupled.gap.search.course import Bounds
-from coupled.gap.search.descent import WHOLE, Descent
-from coupled.gap.search.fit import Fit, fit, touched
-from coupled.gap.search.timed import Timing, timed
-from coupled.gap.signals.output import Output, Part, stage_gaps, stage_limits
+from coupled.gap.search.course import Bounds, Timing, timed
+from coupled.gap.search.found import Fit
+from coupled.gap.signals.output import Output, stage_gaps, stage_limits
 from coupled.gap.thresholds import HEARD_ANEW, SETTLE_FROM
 from coupled.record.channels import ControlName
 from coupled.rig.rig import Rig
@@ -39,11 +36,8 @@ class Case:
     outputs: Sequence[Output]
     tell: Tell | None = None
     refloored: Callable[[Rig], Sequence[Output]] | None = None
-    # A model with an error of its own strains its settings: only a stage over its limit is guilty.
-    only_wide: bool = False
+    only_wide: bool = False  # the floors hold the error of a model of the healthy machine
     timings: Sequence[tuple[Effect, Timing, Bounds]] = ()
-    # Its fits: a case of other outputs, made by `replace`, begins with none.
-    _known: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     @cached_property
     def known(self) -> dict[str, Effect]:
@@ -88,7 +82,11 @@ class Case:
     @cached_property
     def settings(self) -> dict[str, Effect]:
         """The settings that the outputs depend on, by name: nuisances of every fit."""
-        return {name: one for name, one in self.known.items() if self._unsettled & {*one.shows_in}}
+        return {name: one for name, one in self.known.items() if self.is_open(one)}
+
+    def is_open(self, effect: Effect) -> bool:
+        """Tell whether the rig as filed leaves a gap in an output in which an effect shows."""
+        return bool(self._unsettled & {*effect.shows_in})
 
     @cached_property
     def contact(self) -> tuple[Effect, ...]:
@@ -132,9 +130,7 @@ class Case:
         found: dict[str, float] = {}
         for one in self.outputs:
             new = made.get((one.record, one.channel), one)
-            floor = max(
-                one.floor, hypot(min(one.own, new.own), new.carried) if new.carried else new.floor
-            )
+            floor = max(one.floor, hypot(min(one.own, new.own), new.carried))
             gap = one.gap(rig) * one.floor / floor
             if one.stage == "surface" and rig.flight != self.nominal.flight:
                 gap = min(gap, new.gap(rig))
@@ -146,7 +142,7 @@ class Case:
         limits = stage_limits(self.outputs)
         return {at for at, gap in self.gaps(rig).items() if gap > limits[at]}
 
-    def surely_open(self, settled: Rig | None = None) -> Case:
+    def surely_open(self, settled: Rig) -> Case:
         """Return the case in which a gap that no colour of noise explains is held to noise alone.
 
         What is not known of the colour of what drives a stage says whether it has a gap. Once it
@@ -154,15 +150,12 @@ class Case:
         """
         if not any(output.unsure for output in self.outputs):
             return self
-        rig = self.fit(()).rig if settled is None else settled
-        settled_gaps, limits = stage_gaps(self.outputs, rig), stage_limits(self.outputs)
+        settled_gaps, limits = stage_gaps(self.outputs, settled), stage_limits(self.outputs)
         outputs = [
             replace(one, unsure=0.0) if settled_gaps[one.stage] > limits[one.stage] else one
             for one in self.outputs
         ]
-        anew = replace(self, outputs=outputs)
-        anew._known.update(self._known)  # no fit asks for a limit
-        return anew
+        return replace(self, outputs=outputs)
 
     def heard_anew(self, rig: Rig) -> Case | None:
         """Return the case with the noise that a rig's residuals have; None where none is lower.
@@ -209,43 +202,12 @@ class Case:
         )
         return next(((timing, seen) for timing, seen, timed in each if timed & keys), None)
 
-    def nuisances(self, effects: Sequence[Effect]) -> list[Effect]:
-        """Return the settings whose number none of these effects frees, nor is the same law as.
-
-        Where friction is filed, or among the effects, how far its contact yields is one.
-        """
-        freed = {p.key for effect in effects for p in effect.parameters}
-        same = {name for effect in effects for name in effect.swallows}
-        free = [one for name, one in self.settings.items() if name not in same]
-        if any(effect.dry for effect in effects) or is_dry(self.nominal, self.control):
-            free += [one for one in self.contact if self._unsettled & {*one.shows_in}]
-        return [one for one in free if freed.isdisjoint(p.key for p in one.free)]
-
     def with_only(self, found: Fit, effects: Sequence[Effect]) -> Rig:
-        """Return the rig with some of the effects that a fit found, and its settings."""
-        every = (*effects, *self.nuisances(found.effects))
-        rig = possible(self.nominal, self.control, every, {**self.neutral, **found.values})
+        """Return the rig with some of the effects that a fit found, and its nuisance parameters."""
+        known = (*self.settings.values(), *self.contact)
+        free = [one for one in known if one.value_key(one.free[0]) in found.values]
+        rig = possible(self.nominal, self.control, (*effects, *free), found.values)
         return self.nominal if rig is None else rig
-
-    def fit(
-        self,
-        effects: Sequence[Effect],
-        part: Part = "all",
-        start: Mapping[str, float] | None = None,
-        only: Effect | None = None,
-        descent: Descent = WHOLE,
-        near: Fit | None = None,
-    ) -> Fit:
-        """Return the effects fitted, with the settings free within their tolerance.
-
-        With `only`, just that one and what shares an output with it; the others stay. `near` is a
-        fit of this case that ended at the start.
-        """
-        free = self.nuisances(effects)
-        start = self.with_contact(effects, free, start or {})
-        given = (self.nominal, self.control, self.outputs, effects, free, part, start, only)
-        known = {} if near is None else near.slopes
-        return fit(*given, replace(descent, known=self._known, slopes=known))
 
     def but_for_contact(self, values: Mapping[str, float]) -> dict[str, float]:
         """Return fitted values without those of the contact, which a fit then seeks anew."""

@@ -1,109 +1,101 @@
-"""Fitting a set of effects to a record's stages, as physics, by least squares.
+"""Fit a set of effects, with the nuisance parameters, to a record's stages by least squares.
 
-The residuals are in floors, so a channel weighs by what noise leaves it. Each fit returns
-its outcome: values, intervals (from the Jacobian, widened by the residual's memory), which
-of them stand at a bound, and the residuals.
+The residuals are in noise floors, so each channel weighs by its noise. With the residual r of the
+outputs, the effects' parameters θ and the nuisance parameters φ, a fit minimises
+
+    ½·Σ_o Σ r_o(θ, φ)²·q/q_o + ½·u·Σ ((φ − φ₀)/σ)²,    q = min q_o,  u = min τ_o·q_o
+
+q_o is the mean square of output o's residual, 1 at least, and τ_o its autocorrelation time in
+frames, both where the fit starts; records of one channel share their q_o, the mean over its frames,
+since their noise and misfit are of one machine. An output that another effect disturbs weighs less.
+u is one unit of −2 log-likelihood, so the nuisance parameters' Gaussian priors, the second sum,
+weigh against the data as they do in a posterior. Fits run in several legs, so the weights follow
+the residual.
+
+A fit returns its outcome: values, 95 % intervals, the information matrix, and which parameters are
+at a bound.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
+from itertools import pairwise
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.gap.effects.effect import Effect, Parameter, possible
+from coupled.gap.effects.effect import Effect, Parameter, possible, touched
 from coupled.gap.effects.settings import CONTACT
-from coupled.gap.search.descent import WHOLE, Descent
-from coupled.gap.search.intervals import beyond, half_width, least_of, open_above, worth_of
+from coupled.gap.search.case import Case
+from coupled.gap.search.descent import WHOLE, Descent, End
+from coupled.gap.search.found import Fit, Group
+from coupled.gap.search.intervals import half_width, least_of, open_above, worth_of
 from coupled.gap.search.slopes import Slope
-from coupled.gap.signals.output import Output, Part
-from coupled.gap.thresholds import LEAST_GAIN
+from coupled.gap.signals.output import Output, Part, memory
+from coupled.gap.thresholds import FIT_LEGS, WEIGHT_CHANGED
 from coupled.parallel import go_on
 from coupled.record.channels import ControlName
 from coupled.rig.rig import Rig
 
 Floats = NDArray[np.float64]
-_FAR = 1e6  # floors: the residual of a rig that the physics cannot give
+Normal = tuple[float, float]  # mean and standard deviation
+_FAR = 1e6  # noise floors: the residual of a rig that the physics cannot give
 
 
-@dataclass(frozen=True)
-class Fit:
-    """A fitted set of effects: `values`, `low`, `high` (95 %) by "effect.parameter"."""
-
-    effects: tuple[Effect, ...]
-    values: Mapping[str, float]
-    low: Mapping[str, float]
-    high: Mapping[str, float]
-    at_bound: tuple[str, ...]
-    rig: Rig
-    cost: float  # half the sum of squares, in floors
-    # {keys of parameters fitted together: JᵀJ in their own units}, J in floors
-    information: Mapping[tuple[str, ...], Floats] = field(default_factory=dict, compare=False)
-    # {the same: the slopes of all frames where it ended}, to begin another fit by
-    slopes: Mapping[tuple[str, ...], Slope | None] = field(
-        default_factory=dict, repr=False, compare=False
-    )
-
-
-def touched(outputs: Sequence[Output], effects: Sequence[Effect]) -> list[Output]:
-    """Return the outputs that these effects act on."""
-    stages = {stage for effect in effects for stage in effect.shows_in}
-    return [output for output in outputs if output.stage in stages]
-
-
-def fit(
-    nominal: Rig,
-    control: ControlName,
-    outputs: Sequence[Output],
+def fit_set(
+    case: Case,
     effects: Sequence[Effect],
-    nuisances: Sequence[Effect] = (),
-    part: Part = "all",
-    start: Mapping[str, float] | None = None,
-    only: Effect | None = None,
+    nuisances: Sequence[Effect],
+    priors: Mapping[str, Normal],
+    start: Mapping[str, float],
+    parent: Fit | None = None,
     descent: Descent = WHOLE,
+    part: Part = "all",
 ) -> Fit:
-    """Return the effects fitted to a part of the outputs that they touch.
+    """Return the effects fitted to a part of the record, with the nuisance parameters free.
 
-    Starts from each parameter's own starts, or from `start` where it has a value, and keeps
-    the best. `nuisances` are settings, free within their tolerance: fitted, but nothing found.
-    Effects that share no output are fitted each on its own, so that neither's misfit misleads
-    the other; of effects that free the same number the first fits it, and the others have it
-    from there. With `only`, just those that share one with it, and the others stay at `start`. A
-    set that the physics cannot give stands at its bounds.
+    A fit starts from each parameter's own starts, or from `start` where it has a value, and keeps
+    the best. Effects that share no output are fitted apart; of `parent` the groups that are the
+    same, and start where they ended, are taken over. A rig that the physics cannot give has all its
+    parameters at a bound.
+    `priors` are (mean, standard deviation) by "effect.parameter", in the parameters' own units.
     """
     every = [*effects, *nuisances]
     values: dict[str, float] = {}
     low: dict[str, float] = {}
     high: dict[str, float] = {}
     bound: tuple[str, ...] = ()
-    cost, information = 0.0, dict[tuple[str, ...], Floats]()
-    slopes = dict[tuple[str, ...], Slope | None]()
-    for group in _groups(every):
-        if only is None or only in group:
-            ours = touched(outputs, group)
-            given = (nominal, control, ours, group, part, start or {}, nuisances, descent)
-            found = _remembered(*given)
-            low, high, bound = low | found.low, high | found.high, bound + found.at_bound
-            values, cost = values | found.values, cost + found.cost
-            information[tuple(found.values)] = found.information
-            slopes[tuple(found.values)] = found.slope
-            continue
-        keys, frees = _free(group)
-        values |= dict(zip(keys, _starts(keys, frees, start or {})[0], strict=True))
-    for key, owner in shared(every).items():
-        values[key] = values[owner]
-        if owner in low:
-            low[key], high[key] = low[owner], high[owner]
-    rig = possible(nominal, control, every, values)
+    cost, groups = 0.0, dict[tuple[Effect, ...], Group]()
+    for members in grouped(every):
+        known = None if parent is None else parent.groups.get(tuple(members))
+        if known is None or any(start.get(key, at) != at for key, at in known.values.items()):
+            known = _remembered(case, members, priors, start, descent, parent, part)
+        groups[tuple(members)] = known
+        low, high, bound = low | known.low, high | known.high, bound + known.at_bound
+        values, cost = values | known.values, cost + known.cost
+    rig = possible(case.nominal, case.control, every, values)
     if rig is None:
-        rig, bound = nominal, tuple(values)
-    return Fit(tuple(effects), values, low, high, bound, rig, cost, information, slopes)
+        rig, bound = case.nominal, tuple(values)
+    return Fit(tuple(effects), values, low, high, bound, rig, cost, groups=groups)
 
 
-def _groups(effects: Sequence[Effect]) -> list[list[Effect]]:
+def fit_alone(
+    rig: Rig,
+    control: ControlName,
+    outputs: Sequence[Output],
+    effects: Sequence[Effect],
+    start: Mapping[str, float] | None = None,
+    part: Part = "all",
+) -> Fit:
+    """Return effects fitted to a part of some outputs, without nuisance parameters."""
+    return fit_set(Case(rig, control, outputs), effects, (), {}, start or {}, part=part)
+
+
+def grouped(effects: Sequence[Effect]) -> list[list[Effect]]:
     """Return the effects in groups that share no output."""
     groups: list[tuple[set[str], list[Effect]]] = []
     for effect in effects:
@@ -118,134 +110,300 @@ def _groups(effects: Sequence[Effect]) -> list[list[Effect]]:
     return [members for _, members in groups]
 
 
-@dataclass(frozen=True)
-class _Group:
-    """The fit of effects that share outputs."""
-
-    values: dict[str, float]
-    low: dict[str, float]
-    high: dict[str, float]
-    at_bound: tuple[str, ...]
-    cost: float
-    information: Floats
-    slope: Slope | None = None
-
-
-# {effects, which are nuisances, part, whether by wide steps, evaluations, values at the starts:
-# the fit}, of one rig and its outputs
-Asked = tuple[tuple[Effect, ...], frozenset[str], Part, bool, int, tuple[tuple[float, ...], ...]]
-
-
 def _remembered(
-    nominal: Rig,
-    control: ControlName,
-    ours: Sequence[Output],
-    effects: Sequence[Effect],
-    part: Part,
+    case: Case,
+    members: Sequence[Effect],
+    priors: Mapping[str, Normal],
     start: Mapping[str, float],
-    nuisances: Sequence[Effect],
     descent: Descent,
-) -> _Group:
+    parent: Fit | None,
+    part: Part,
+) -> Group:
     """Return a fit, as it is known; one that starts where another ended is that one."""
-    known = descent.known
+    ours, known = touched(case.outputs, members), descent.known
+    if descent.most < WHOLE.most and parent is not None:
+        descent = replace(descent, held=_held(case, ours, _free(members)[0], parent))
     if known is None:
-        return _fit(nominal, control, ours, effects, part, start, nuisances, descent)
-    stepped = any(output.stepped for output in ours)
-    wide = stepped and descent.steps == "wide"
-    among = frozenset(one.name for one in nuisances if one in effects)
-    what = (tuple(effects), among, part, wide, descent.most)
-    key: Asked = (*what, tuple(map(tuple, _starts(*_free(effects), start))))
+        return _fit(case, ours, members, priors, start, descent, part)
+    wide = any(output.stepped for output in ours) and descent.steps == "wide"
+    what = (tuple(members), wide, descent.most, part)
+    key = (*what, tuple(map(tuple, _starts(members, start))))
     if key not in known:
-        given = (nominal, control, ours, effects, part, start, nuisances, descent)
-        known[key] = found = _fit(*given)
+        known[key] = found = _fit(case, ours, members, priors, start, descent, part)
         known[*what, (tuple(found.values.values()),)] = found
-    held: _Group = known[key]
+    held: Group = known[key]
     return held
 
 
+def _held(case: Case, ours: Sequence[Output], keys: Sequence[str], parent: Fit) -> Floats | None:
+    """Return the slopes that a parent's fit ended with, NaN for parameters that it lacks.
+
+    Its shape is (frames, parameters). None where it has none of them.
+    """
+    edges = np.cumsum([0, *(len(output.measured) for output in ours)]).tolist()
+    rows = {id(one): slice(*ends) for one, ends in zip(ours, pairwise(edges), strict=True)}
+    found = np.full((edges[-1], len(keys)), np.nan)
+    for members, group in parent.groups.items():
+        theirs = [k for k, key in enumerate(group.values) if key in keys]
+        if group.slope is None or not theirs:
+            continue
+        mine = [keys.index([*group.values][k]) for k in theirs]
+        found[:, mine] = 0.0
+        first = 0
+        for output in touched(case.outputs, members):
+            last = first + len(output.measured)
+            if id(output) in rows:
+                found[rows[id(output)], mine] = group.slope.jacobian[first:last, theirs]
+            first = last
+    return None if np.isnan(found).all() else found
+
+
 def _fit(
-    nominal: Rig,
-    control: ControlName,
+    case: Case,
     ours: Sequence[Output],
     effects: Sequence[Effect],
-    part: Part,
+    priors: Mapping[str, Normal],
     start: Mapping[str, float],
-    nuisances: Sequence[Effect] = (),
     descent: Descent = WHOLE,
-) -> _Group:
+    part: Part = "all",
+    legs: int = FIT_LEGS,
+) -> Group:
+    """Return a fit; by the loader's own steps it goes on until its weights are those of its end."""
+    nominal, control = case.nominal, case.control
     keys, frees = _free(effects)
+    if not ours:
+        known = dict(zip(keys, _starts(effects, start)[0], strict=True))
+        return Group(known, {}, {}, (), 0.0, np.zeros((len(keys), len(keys))))
     scale = np.array([_scale(p) for p in frees])
-    frames = sum(len(output.measured) for output in ours)
+    frames = [int(np.count_nonzero(output.rows(part))) for output in ours]
 
-    def residual(scaled: Floats, wide: bool = False, rough: bool = False) -> Floats:
+    def plain(scaled: Floats, wide: bool = False, rough: bool = False) -> list[Floats]:
         go_on()
         values = dict(zip(keys, (scaled * scale).tolist(), strict=True))
         rig = possible(nominal, control, effects, values)
         if rig is None:
-            return np.full(frames, _FAR)
-        return np.concatenate([output.residual(rig, "all", wide, rough) for output in ours])
+            return [np.full(count, _FAR) for count in frames]
+        return [output.residual(rig, part, wide, rough) for output in ours]
 
-    if not ours:
-        known = dict(zip(keys, _starts(keys, frees, start)[0], strict=True))
-        return _Group(known, {}, {}, (), 0.0, np.zeros((len(keys), len(keys))))
-    rows = np.concatenate([output.rows(part) for output in ours])
+    firsts = [np.array(first) / scale for first in _starts(effects, start)]
+    begun = plain(firsts[0], wide=True)
+    squares = _squares(ours, begun)
+    weights = [math.sqrt(min(squares) / one) for one in squares]
+
+    def residual(scaled: Floats, wide: bool = False, rough: bool = False) -> Floats:
+        lefts = zip(plain(scaled, wide, rough), weights, strict=True)
+        return np.concatenate([weight * left for left, weight in lefts])
+
     if not keys:
-        left = residual(np.array([]))[rows]
-        return _Group({}, {}, {}, (), 0.5 * float(left @ left), np.zeros((0, 0)))
+        left = residual(np.array([]))
+        return Group({}, {}, {}, (), 0.5 * float(left @ left), np.zeros((0, 0)))
     ends = np.array([p.bounds(nominal, control) for p in frees]).T
     low, high = ends / scale
     stepped = any(output.stepped for output in ours)
-    firsts = [np.array(first) / scale for first in _starts(keys, frees, start)]
-    # A contact is free beside any dry friction that is filed.
+    unit = min(_unit(left) for left in begun)
+    prior = _Priors.of([priors.get(key) for key in keys], scale, unit)
+    # How the contact of dry friction yields is free beside any friction that is filed.
     rubs = any(one.dry for one in effects) or any(p.key in CONTACT for p in frees)
-    search = replace(descent, rubs=rubs)
-    best = search.end(residual, firsts, (low, high), stepped, rows, descent.slopes.get(tuple(keys)))
+
+    def with_prior(scaled: Floats, wide: bool = False, rough: bool = False) -> Floats:
+        return np.concatenate((residual(scaled, wide, rough), prior.rows(scaled)))
+
+    rows = np.repeat(weights, frames)
+    before, held = descent.slopes.get(tuple(keys)), descent.held
+    slope = None if before is None else prior.in_slope(before, rows)
+    if held is not None:
+        held = np.vstack((rows[:, None] * held, prior.slopes))
+    search = replace(descent, rubs=rubs, held=held)
+    best = prior.without(search.end(with_prior, firsts, (low, high), stepped, slope=slope))
 
     def cost(at: float, k: int) -> float:
-        left = residual(_with(best.x, k, at))[rows]
+        left = residual(_with(best.x, k, at))
         return 0.5 * float(left @ left)
 
-    swallows = [k for k, p in enumerate(frees) if p.saturates]
-    for k in swallows:
+    for k in (k for k, p in enumerate(frees) if p.saturates):
         most = cost(float(high[k]), k)
         if most < best.cost:
             span = (float(best.x[k]), float(high[k]))
             edge = _with(best.x, k, least_of(partial(cost, k=k), span, most))
-            again = search.end(residual, [edge], (low, high), stepped, rows)
-            best = min(best, again, key=lambda one: one.cost)
+            found = search.end(with_prior, [edge], (low, high), stepped)
+            best = min(best, prior.without(found), key=lambda one: one.cost)
+    free = _Free(keys, frees, scale, ends, weights, frames)
+    changed = _changed(squares, best, free, ours)
+    if legs > 1 and descent.steps != "wide" and changed > WEIGHT_CHANGED:
+        again = dict(zip(keys, (best.x * scale).tolist(), strict=True))
+        rest = replace(descent, slopes={})
+        return _fit(case, ours, effects, priors, again, rest, part, legs - 1)
+    best = replace(best, slope=None if held is not None else _plain(best.slope, rows))
     number = [1000 * output.record + output.stretches[output.rows(part)] for output in ours]
-    within = {one.value_key(p) for one in nuisances for p in one.free}
-    known = np.array([12.0 if key in within else 0.0 for key in keys]) / (high - low) ** 2
-    half = half_width(best, len(ours), np.concatenate(number), known) * scale
+    return _group(case, np.concatenate(number), free, best, prior, cost)
+
+
+class Cost(Protocol):
+    """Half the sum of squares of a fit with scaled parameter `k` elsewhere."""
+
+    def __call__(self, at: float, k: int) -> float:
+        """Return it with the parameter at `at`."""
+
+
+@dataclass(frozen=True)
+class _Free:
+    """The free parameters of a fit: their keys, and what scales them; `ends` are their bounds.
+
+    `weights` are those of the outputs' residuals, and `frames` how many each has.
+    """
+
+    keys: list[str]
+    numbers: list[Parameter]
+    scale: Floats
+    ends: Floats
+    weights: list[float]
+    frames: list[int]
+
+    def parts(self) -> Iterator[tuple[slice, float]]:
+        """Yield each output's rows of a fit, and their weight."""
+        edges = np.cumsum([0, *self.frames]).tolist()
+        for (first, last), weight in zip(pairwise(edges), self.weights, strict=True):
+            yield slice(first, last), weight
+
+
+def _group(
+    case: Case,
+    stretches: NDArray[np.intp],
+    free: _Free,
+    best: End,
+    prior: _Priors,
+    cost: Cost,
+) -> Group:
+    """Return a fit that ended: its values with their intervals, and which are at a bound.
+
+    `stretches` number the rows' stretches, `cost` is that with one parameter elsewhere.
+    """
+    (low, high), scale = free.ends / free.scale, free.scale
+    outputs = len(free.frames)
+    half = half_width(best, outputs, stretches, prior.precision) * scale
     # Where all that is filed is taken off, nothing is left of it: that is an answer.
-    gone = np.isclose(best.x, low, atol=1e-4) & (ends[0] < [p.low for p in frees])
-    values = np.where(gone, ends[0], best.x * scale)
-    sizes = [p.error(v, nominal, control) for p, v in zip(frees, values, strict=True)]
-    half = np.hypot(half, sizes)
+    gone = np.isclose(best.x, low, atol=1e-4) & (free.ends[0] < [p.low for p in free.numbers])
+    values = np.where(gone, free.ends[0], best.x * scale)
+    pairs = zip(free.numbers, values, strict=True)
+    half = np.hypot(half, [p.error(v, case.nominal, case.control) for p, v in pairs])
     # A small cubic is near its bound on the scale of a large one, but known not to be there.
     small = np.isclose(best.x, low, atol=1e-4) & ((best.x - low) * scale <= half)
     stuck = small | np.isclose(best.x, high, rtol=1e-4)
-    stuck &= ~np.array([p.may_end for p in frees]) & ~gone
-    # A setting may well stand at its end where little would be gained beyond.
-    stuck &= (known == 0.0) | (beyond(best, len(ours)) >= LEAST_GAIN)
+    stuck &= ~np.array([p.may_end for p in free.numbers]) & ~gone
     # Of a limit that the records do not meet, nothing is known, and the others stand without it.
-    stuck |= ~np.isfinite(half) & ~np.array([p.may_end and p.inverse for p in frees])
+    stuck |= ~np.isfinite(half) & ~np.array([p.may_end and p.inverse for p in free.numbers])
     lower, upper = values - half, values + half
-    for k in swallows:
-        span = (float(low[k]), float(high[k]))
-        open_one = open_above(partial(cost, k=k), float(best.x[k]), span, worth_of(best, len(ours)))
+    for k in (k for k, p in enumerate(free.numbers) if p.saturates):
+        span, unit = (float(low[k]), float(high[k])), worth_of(best, outputs)
+        open_one = open_above(partial(cost, k=k), float(best.x[k]), span, unit)
         if open_one is not None:
             values[k], lower[k], upper[k] = open_one[0] * scale[k], open_one[1] * scale[k], np.inf
             stuck[k] = False
-    return _Group(
-        dict(zip(keys, values.tolist(), strict=True)),
-        dict(zip(keys, lower.tolist(), strict=True)),
-        dict(zip(keys, upper.tolist(), strict=True)),
-        tuple(key for key, at in zip(keys, stuck, strict=True) if at),
+    return Group(
+        dict(zip(free.keys, values.tolist(), strict=True)),
+        dict(zip(free.keys, lower.tolist(), strict=True)),
+        dict(zip(free.keys, upper.tolist(), strict=True)),
+        tuple(key for key, at in zip(free.keys, stuck, strict=True) if at),
         best.cost,
-        np.asarray(best.jac.T @ best.jac) / np.outer(scale, scale),
+        _information(best, free) / np.outer(scale, scale),
+        prior.penalty(best.x),
         best.slope,
     )
+
+
+def _unit(left: Floats) -> float:
+    """Return the part of a residual's sum of squares that is one unit of −2 log-likelihood."""
+    return max(float(np.mean(left**2)), 1.0) * memory(left)
+
+
+def _squares(outputs: Sequence[Output], lefts: Sequence[Floats]) -> list[float]:
+    """Return the mean square of each output's channel, floors², 1 at least."""
+    channels = [(output.stage, output.channel) for output in outputs]
+    found = []
+    for channel in channels:
+        same = [left for left, other in zip(lefts, channels, strict=True) if other == channel]
+        found.append(max(float(np.mean(np.concatenate(same) ** 2)), 1.0))
+    return found
+
+
+def _changed(squares: Sequence[float], end: End, free: _Free, outputs: Sequence[Output]) -> float:
+    """Return by what factor the channels' mean squares changed most in a weighted fit."""
+    ended = _squares(outputs, [end.fun[rows] / weight for rows, weight in free.parts()])
+    return max(max(a / b, b / a) for a, b in zip(squares, ended, strict=True))
+
+
+def _plain(slope: Slope | None, weights: Floats) -> Slope | None:
+    """Return a weighted fit's slopes without the weights of the rows, and without priors' rows."""
+    if slope is None:
+        return None
+    left, jacobian = slope.left[: len(weights)], slope.jacobian[: len(weights)]
+    return Slope(slope.at, left / weights, jacobian / weights[:, None])
+
+
+def _information(end: End, free: _Free) -> Floats:
+    """Return the information matrix of the log-likelihood at the end of a weighted fit."""
+    total = np.zeros((end.jac.shape[1], end.jac.shape[1]))
+    for rows, weight in free.parts():
+        jacobian = end.jac[rows] / weight
+        total += jacobian.T @ jacobian / _unit(end.fun[rows] / weight)
+    return total
+
+
+@dataclass(frozen=True)
+class _Priors:
+    """The Gaussian priors of scaled parameters: `at` numbers those that have one.
+
+    `unit` is the part of a sum of squares that is one unit of −2 log-likelihood.
+    """
+
+    at: NDArray[np.intp]
+    mean: Floats
+    sigma: Floats
+    numbers: int
+    unit: float
+
+    @classmethod
+    def of(cls, each: Sequence[Normal | None], scale: Floats, unit: float) -> _Priors:
+        """Return the priors of parameters, None for one that has none."""
+        known = [(k, prior) for k, prior in enumerate(each) if prior is not None]
+        at = np.array([k for k, _ in known], dtype=np.intp)
+        mean = np.array([prior[0] for _, prior in known]) / scale[at]
+        sigma = np.array([prior[1] for _, prior in known]) / scale[at]
+        return cls(at, mean, sigma, len(each), unit)
+
+    def rows(self, scaled: Floats) -> Floats:
+        """Return the rows of the least squares, one a prior."""
+        return np.asarray(np.sqrt(self.unit) * (scaled[self.at] - self.mean) / self.sigma)
+
+    @property
+    def precision(self) -> Floats:
+        """1/variance of each scaled parameter before the data, 0 without a prior."""
+        found = np.zeros(self.numbers)
+        found[self.at] = self.sigma**-2.0
+        return found
+
+    def penalty(self, scaled: Floats) -> float:
+        """Return by how much the log density of the priors is below its maximum."""
+        return 0.5 * float(np.sum(((scaled[self.at] - self.mean) / self.sigma) ** 2))
+
+    @property
+    def slopes(self) -> Floats:
+        """The rows' slopes, shape (rows, numbers)."""
+        found = np.zeros((len(self.at), self.numbers))
+        found[np.arange(len(self.at)), self.at] = np.sqrt(self.unit) / self.sigma
+        return found
+
+    def in_slope(self, slope: Slope, weights: Floats) -> Slope:
+        """Return another fit's slopes, its rows weighted, with the rows of these priors."""
+        left = np.concatenate((weights * slope.left, self.rows(slope.at)))
+        return Slope(slope.at, left, np.vstack((weights[:, None] * slope.jacobian, self.slopes)))
+
+    def without(self, end: End) -> End:
+        """Return the end of a fit without the priors' rows."""
+        if not len(self.at):
+            return end
+        left, jacobian = end.fun[: -len(self.at)], end.jac[: -len(self.at)]
+        return replace(end, fun=left, jac=jacobian, cost=0.5 * float(left @ left))
 
 
 def _with(x: Floats, k: int, at: float) -> Floats:
@@ -261,27 +419,16 @@ def _scale(p: Parameter) -> float:
 
 
 def _free(effects: Sequence[Effect]) -> tuple[list[str], list[Parameter]]:
-    others = shared(effects)
-    pairs = [(e.value_key(p), p) for e in effects for p in e.free if e.value_key(p) not in others]
-    return [key for key, _ in pairs], [p for _, p in pairs]
-
-
-def shared(effects: Sequence[Effect]) -> dict[str, str]:
-    """Return {a value's key: that of the same number of the rig, which an effect before it has}."""
-    owner: dict[str, str] = {}
-    found = {}
+    """Return the keys and parameters that a fit frees; of two of one number, the first."""
+    owners: dict[str, tuple[str, Parameter]] = {}
     for effect in effects:
         for p in effect.free:
-            key = effect.value_key(p)
-            if owner.setdefault(p.key, key) != key:
-                found[key] = owner[p.key]
-    return found
+            owners.setdefault(p.key, (effect.value_key(p), p))
+    return [key for key, _ in owners.values()], [p for _, p in owners.values()]
 
 
-def _starts(
-    keys: list[str], frees: list[Parameter], start: Mapping[str, float]
-) -> list[list[float]]:
-    pairs = list(zip(keys, frees, strict=True))
+def _starts(effects: Sequence[Effect], start: Mapping[str, float]) -> list[list[float]]:
+    pairs = list(zip(*_free(effects), strict=True))
     tries = max((len(p.starts) for key, p in pairs if key not in start), default=1)
     return [
         [start.get(key, p.starts[min(i, len(p.starts) - 1)]) for key, p in pairs]

@@ -47,17 +47,6 @@ def half_width(found: End, outputs: int, groups: Numbers, known: Floats) -> Floa
     return np.asarray(half)
 
 
-def beyond(found: End, outputs: int) -> Floats:
-    """Return the log-likelihood that each scaled number would gain beyond, by its slopes.
-
-    All the others go along, and the residual counts by its memory.
-    """
-    square, memories = _counted(found.fun, outputs)
-    downhill = found.jac.T @ found.fun
-    loose = np.diag(np.linalg.pinv(found.jac.T @ found.jac))
-    return np.asarray(0.5 * downhill**2 * loose / (square * memories))
-
-
 def open_above(
     cost: Callable[[float], float], found: float, ends: tuple[float, float], worth: float
 ) -> tuple[float, float] | None:

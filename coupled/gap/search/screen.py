@@ -1,123 +1,237 @@
-"""Screening: the projection of the residual on each effect's own signature, in milliseconds.
+"""Screening: which effects may explain a residual, by the projection on each effect's signature.
 
-A signature is taken at sizes over three decades, since friction, play and rate limits do nothing
-at one size and everything at another; the projection itself is free of scale. The size that
-leaves least is where a fit starts.
+A signature is the change of the residual that an effect makes at a size. Signatures are taken at
+sizes over three decades, since friction, play and rate limits do nothing at one size and everything
+at another; the projection itself is free of scale. The size that leaves least is where a fit
+starts.
+
+The power that a signature takes of the residual is the score test's statistic, and gives the gain
+in log-likelihood that the effect is predicted to make (Rao, Math. Proc. Camb. Phil. Soc. 44, 1948).
+An effect whose predicted gain is less than what its prior costs is not fitted. Two effects may pay
+together where neither does alone, since what each leaves is slow and counts few samples: where none
+pays, the best pair is screened by the projection on both signatures. The signatures
+beside one set of effects are nearly those beside another: they are taken once, and again only
+beside the best set.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from coupled.gap.chain import BY_NAME as STAGE_OF
-from coupled.gap.effects.effect import Effect, possible
-from coupled.gap.search.case import Case
-from coupled.gap.search.fit import Fit, touched
-from coupled.gap.search.limits import is_limit, limits
+from coupled.gap.effects.effect import Effect, touched
+from coupled.gap.search.evidence import misfit
+from coupled.gap.search.found import Fit
+from coupled.gap.search.problem import Problem
+from coupled.gap.signals.output import Floats, memory
 from coupled.gap.thresholds import (
-    RACE_BEHIND,
-    SCREEN_ALIKE,
-    SCREEN_FACTORS,
+    ALIKE,
+    BEAM_CANDIDATES,
+    BEAM_FACTORS,
+    BEAM_SIZES,
+    LIMIT_BISECTIONS,
+    LIMIT_SHARES,
+    PRIOR_EFFECT,
     SCREEN_LESS,
     SCREEN_NEAR,
     SCREEN_SHOWN,
-    SCREEN_SIZES,
-    SCREENED,
-    SCREENED_BESIDE,
-    SCREENED_LEAST,
-    SCREENED_MOST,
+    SERVO_SHARES,
 )
 from coupled.parallel import go_on, in_threads
 from coupled.rig.rig import Rig
 
+Values = dict[str, float]
+
 
 class Screened(NamedTuple):
-    """A candidate, where its fits start, and the power that its signature takes, floors²."""
+    """A candidate, where its fits start, and what its signature takes of the residual.
+
+    `taken` is the power, noise floors², `gain` the predicted log-likelihood gain, `direction` the
+    signature that takes most, of unit length.
+    """
 
     effect: Effect
-    starts: list[dict[str, float]]
+    starts: list[Values]
     taken: float
+    gain: float
+    direction: Floats
 
 
-def screen(
-    case: Case, current: Fit, candidates: Sequence[Effect], always: Collection[str] = ()
-) -> list[Screened]:
-    """Return the candidates whose signature takes most of the residual, and where to start.
+class Worth(NamedTuple):
+    """The `least` predicted gain for which an effect is fitted, and the outputs' samples."""
 
-    There is a start for each shape that an effect of several parameters begins from. One without
-    a parameter is always among them, unless it leaves far more than there was, and so are those
-    named in `always`. Beside an effect more are kept: its size is not right until the other's is
-    known, and so neither is what is left. And those that take nearly as much as the best are all
-    kept: which of them is the cause, a signature at one size does not say.
-    """
-    found = in_threads(lambda effect: screened(case, current, effect), candidates)
-    scores = [(*one, effect) for effect, one in zip(candidates, found, strict=True) if one[1]]
-    scores.sort(key=lambda item: -item[0])
-    near = [k for k, item in enumerate(scores) if item[0] >= SCREEN_NEAR * scores[0][0]]
-    many = SCREENED_BESIDE if current.effects else SCREENED
-    alike = sum(item[0] >= SCREEN_ALIKE * scores[0][0] for item in scores[:SCREENED_MOST])
-    most = max(alike, min(many, max(SCREENED_LEAST, len(near))))
-    others = (item for item in scores[most:] if not item[2].free or item[2].name in always)
-    kept = [*scores[:most], *others]
-    return [Screened(effect, starts, taken) for taken, starts, effect in kept]
+    least: float
+    counts: Floats
 
 
-def screened(case: Case, current: Fit, effect: Effect) -> tuple[float, list[dict[str, float]]]:
-    """Return the power that an effect's signature takes, floors², and the starts of its fits."""
-    ours = touched(case.outputs, [effect])
-    now = np.concatenate([output.residual(current.rig, wide=True) for output in ours])
-    best, starts = 0.0, list[dict[str, float]]()
-    for tries in _tries(case, current, effect):
-        least, start = np.inf, {}
-        for values in tries:
-            go_on()
-            rig = _with(case, current, effect, values)
-            if rig is None:
+class _Signature(NamedTuple):
+    """The change of the residual that an effect of some values makes, noise floors, by shape."""
+
+    values: Values
+    shape: int
+    change: Floats
+
+
+@dataclass
+class Screen:
+    """Screens candidates beside sets of effects, and keeps their signatures."""
+
+    problem: Problem
+    variance: Floats
+    known: dict[str, list[_Signature]] = field(default_factory=dict)
+
+    def best(
+        self,
+        current: Fit,
+        candidates: Sequence[Effect],
+        worth: Worth,
+        most: int = BEAM_CANDIDATES,
+        anew: bool = False,
+    ) -> list[Screened]:
+        """Return the candidates whose signatures take most of the residual, the best first.
+
+        Those that take far less than the best are left out, and those that are not `worth` it.
+        Signatures are taken beside the current effects where they are not known, or are asked for
+        `anew`.
+        """
+        wanted = [e for e in candidates if anew or e.name not in self.known]
+        for effect, made in zip(
+            wanted, in_threads(lambda e: self._signatures(current, e), wanted), strict=True
+        ):
+            self.known[effect.name] = made
+        found = [self._screened(current, effect, worth.counts) for effect in candidates]
+        found = [one for one in found if one.starts and one.gain > worth.least]
+        found.sort(key=lambda one: -one.taken)
+        least = SCREEN_NEAR * found[0].taken if found else 0.0
+        return [one for one in found[:most] if one.taken >= least]
+
+    def pair(
+        self, current: Fit, candidates: Sequence[Effect], worth: Worth
+    ) -> tuple[Screened, Screened] | None:
+        """Return the two candidates of one output that take most of its residual together.
+
+        None where two effects are not worth it. Samples are counted by what both leave. The
+        signatures of the candidates are those that `best` has taken.
+        """
+        groups: dict[tuple[int, ...], list[Effect]] = {}
+        for effect in candidates:
+            groups.setdefault(tuple(self._ours(effect)), []).append(effect)
+        found: tuple[float, tuple[Screened, Screened]] | None = None
+        for ours, effects in groups.items():
+            each = [self._screened(current, effect, worth.counts) for effect in effects]
+            each = [one for one in each if one.starts]
+            if len(each) < 2:
                 continue
-            left = np.concatenate([output.residual(rig, wide=True) for output in ours])
-            sign = now - left
-            size = float(sign @ sign)
-            best = max(best, float(now @ sign) ** 2 / size if size > 0.0 else 0.0)
+            now = _residual(self.problem, effects[0], current.rig)
+            shapes = np.array([one.direction for one in each])
+            i, j = _best_two(shapes, now)
+            both = shapes[[i, j]].T
+            left = now - both @ np.linalg.lstsq(both, now, rcond=None)[0]
+            squares = [self._squares(ours, one) for one in (now, left)]
+            parts = np.split(left, self._edges(ours)[1:])
+            counts = np.array([len(part) / memory(part) for part in parts])
+            gain = 0.5 * float(counts @ (misfit(squares[0]) - misfit(squares[1])))
+            if gain > worth.least + PRIOR_EFFECT and (found is None or gain > found[0]):
+                found = gain, (each[i], each[j])
+        return None if found is None else found[1]
+
+    def _ours(self, effect: Effect) -> list[int]:
+        """Return the numbers of the outputs in which an effect shows."""
+        return [k for k, one in enumerate(self.problem.outputs) if one.stage in effect.shows_in]
+
+    def _edges(self, ours: Sequence[int]) -> NDArray[np.int64]:
+        """Return where each of some outputs begins in their joint residual."""
+        return np.cumsum([0, *(len(self.problem.outputs[k].measured) for k in ours[:-1])])
+
+    def _squares(self, ours: Sequence[int], left: Floats) -> Floats:
+        """Return the mean squares of some outputs' residuals, over their variance."""
+        frames = np.array([len(self.problem.outputs[k].measured) for k in ours])
+        squares = np.add.reduceat(left**2, self._edges(ours)) / frames
+        return np.asarray(squares / self.variance[list(ours)])
+
+    def _screened(self, current: Fit, effect: Effect, counts: Floats) -> Screened:
+        """Return a candidate with the start of each shape that leaves least."""
+        now, ours = _residual(self.problem, effect, current.rig), self._ours(effect)
+
+        def unlikely(left: Floats) -> float:
+            return 0.5 * float(counts[ours] @ misfit(self._squares(ours, left)))
+
+        taken, gain, starts = 0.0, 0.0, dict[int, tuple[float, Values]]()
+        direction = np.zeros(len(now))
+        for values, shape, change in self.known[effect.name]:
+            size = float(change @ change)
             # A limit that is never met leaves the residual as it is, and a fit where it was.
-            if size > SCREEN_SHOWN * len(now) and float(left @ left) < least:
-                least, start = float(left @ left), values
-        hopeless = not effect.free and least > RACE_BEHIND * float(now @ now)
-        starts += [start] if start or not (effect.free or hopeless) else []
-    return best, starts
+            if size <= SCREEN_SHOWN * len(now):
+                continue
+            share = float(now @ change) / size
+            if share**2 * size >= taken:
+                taken, direction = share**2 * size, change / math.sqrt(size)
+            gain = max(gain, unlikely(now) - unlikely(now - share * change))
+            left = float((now + change) @ (now + change))
+            if shape not in starts or left < starts[shape][0]:
+                starts[shape] = left, values
+        return Screened(effect, [values for _, values in starts.values()], taken, gain, direction)
+
+    def _signatures(self, current: Fit, effect: Effect) -> list[_Signature]:
+        """Return an effect's signatures beside the current effects."""
+        now = _residual(self.problem, effect, current.rig)
+        found = []
+        for shape, tries in enumerate(_tries(self.problem, current, effect)):
+            for values in tries:
+                go_on()
+                rig = _with(self.problem, current, effect, values)
+                if rig is not None:
+                    change = _residual(self.problem, effect, rig) - now
+                    found.append(_Signature(values, shape, change))
+        return found
 
 
-def _shows(case: Case, current: Fit, effect: Effect, values: dict[str, float]) -> bool:
-    """Tell whether an effect of these values changes the residual."""
-    go_on()
-    rig = _with(case, current, effect, values)
-    if rig is None:
-        return False
-    ours = touched(case.outputs, [effect])
-    turn = [o.residual(current.rig, wide=True) - o.residual(rig, wide=True) for o in ours]
-    return sum(float(t @ t) for t in turn) > SCREEN_SHOWN * sum(len(t) for t in turn)
+def _best_two(shapes: Floats, now: Floats) -> tuple[int, int]:
+    """Return which two of some unit vectors take most of a residual together."""
+    alike = np.clip(shapes @ shapes.T, -1.0, 1.0)
+    np.fill_diagonal(alike, 1.0)
+    own, apart = shapes @ now, np.maximum(1.0 - alike**2, 1e-300)
+    power = own[:, None] ** 2 + own**2 - 2.0 * alike * np.outer(own, own)
+    power = np.where(np.abs(alike) < 1.0 - ALIKE, power / apart, 0.0)
+    i, j = np.unravel_index(int(np.argmax(power)), power.shape)
+    return int(i), int(j)
 
 
-def _with(case: Case, current: Fit, effect: Effect, values: dict[str, float]) -> Rig | None:
+def _residual(problem: Problem, effect: Effect, rig: Rig) -> Floats:
+    ours = touched(problem.outputs, [effect])
+    return np.concatenate([output.residual(rig, wide=True) for output in ours])
+
+
+def _with(problem: Problem, current: Fit, effect: Effect, values: Values) -> Rig | None:
     """Return the current rig with one more effect, None where the physics cannot give it."""
-    chosen = (*current.effects, effect)
-    every = (*chosen, *case.nuisances(chosen))
-    known = {**case.neutral, **current.values, **values}
-    return possible(case.nominal, case.control, every, known)
+    return problem.rig_of((*current.effects, effect), {**current.values, **values})
 
 
-def _tries(case: Case, current: Fit, effect: Effect) -> list[list[dict[str, float]]]:
+def _tries(problem: Problem, current: Fit, effect: Effect) -> list[list[Values]]:
     """Return sets of an effect's parameters to try, by shapes of which each may give a start."""
     if is_limit(effect) and not STAGE_OF[effect.stage].flown:
         key = effect.value_key(effect.free[0])
-        met = limits(effect, lambda value: _shows(case, current, effect, {key: value}))
-        return [[{key: value} for value in each] for each in met]
+        now = _residual(problem, effect, current.rig)
+
+        def shows(value: float) -> bool:
+            go_on()
+            rig = _with(problem, current, effect, {key: value})
+            if rig is None:
+                return False
+            change = _residual(problem, effect, rig) - now
+            return float(change @ change) > SCREEN_SHOWN * len(now)
+
+        return [[{key: value} for value in each] for each in limits(effect, shows)]
     if effect.seen is None:
         shapes = max([len(p.starts) for p in effect.free], default=1)
-        return [_sizes(case, current, effect, shape) for shape in range(shapes)]
-    seen = effect.seen(case.outputs, current.rig, case.control)
+        return [_sizes(problem, current, effect, shape) for shape in range(shapes)]
+    seen = effect.seen(problem.outputs, current.rig, problem.case.control)
     return [
         [
             {effect.value_key(p): float(np.clip(one[p.name], p.low, p.high)) for p in effect.free}
@@ -126,32 +240,55 @@ def _tries(case: Case, current: Fit, effect: Effect) -> list[list[dict[str, floa
     ]
 
 
-def _sizes(case: Case, current: Fit, effect: Effect, shape: int) -> list[dict[str, float]]:
+def _sizes(problem: Problem, current: Fit, effect: Effect, shape: int) -> list[Values]:
     """Return sets of an effect's parameters to try; one where each has to be flown."""
     flown = STAGE_OF[effect.stage].flown
     found = []
-    for k in range(1 if flown or not effect.free else len(SCREEN_SIZES)):
+    for k in range(1 if flown or not effect.free else len(BEAM_SIZES)):
         values = {}
         for p in effect.free:
             start = value = p.starts[min(shape, len(p.starts) - 1)]
             if not flown and p.mode == "factor":
-                value = 1.0 + SCREEN_FACTORS[k] * (start - 1.0)
+                value = 1.0 + BEAM_FACTORS[k] * (start - 1.0)
             elif not flown and p.scanned:
-                value = SCREEN_SIZES[k] * start
-            value += p.base(current.rig, case.control)
+                value = BEAM_SIZES[k] * start
+            value += p.base(current.rig, problem.case.control)
             values[effect.value_key(p)] = float(np.clip(value, p.low, p.high))
         found.append(values)
-    return found + _less(case, effect, found[0])
+    return found + _less(problem, effect, found[0])
 
 
-def _less(case: Case, effect: Effect, first: dict[str, float]) -> list[dict[str, float]]:
+def _less(problem: Problem, effect: Effect, first: Values) -> list[Values]:
     """Return sets with less of what is filed than the rig file says, where some of it is."""
     found = []
     for share in SCREEN_LESS:
         values = dict(first)
         for p in effect.free:
-            least = p.bounds(case.nominal, case.control)[0]
+            least = p.bounds(problem.case.nominal, problem.case.control)[0]
             if p.scanned and least < p.low:
                 values[effect.value_key(p)] = share * least
         found += [values] if values != first else []
     return found
+
+
+def is_limit(effect: Effect) -> bool:
+    """Tell whether an effect is a limit and nothing else."""
+    return len(effect.free) == 1 and effect.free[0].inverse
+
+
+def limits(effect: Effect, shows: Callable[[float], bool]) -> list[list[float]]:
+    """Return sets of limits to try, from the largest one that shows on, in the limit's own unit.
+
+    Of each set the best is a start. `shows` tells of a limit whether it changes what is predicted.
+    None where not even the lowest does.
+    """
+    number = effect.free[0]
+    low, high = math.log(number.low), math.log(number.high)
+    if not shows(number.low):
+        return []
+    for _ in range(LIMIT_BISECTIONS):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if shows(math.exp(middle)) else (low, middle)
+    sets = (LIMIT_SHARES, SERVO_SHARES) if effect.stage == "linkage" else (LIMIT_SHARES,)
+    most = math.exp(low)
+    return [[max(share * most, number.low) for share in shares] for shares in sets]

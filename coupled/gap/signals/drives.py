@@ -9,17 +9,21 @@ A record may have motion and force of the grip and no δc. If a spring holds the
 to the force is predicted, with the linkage in series (`stages.series`). Without a spring this
 prediction would drift, so the motion is taken as imposed and the force as output
 (`stages.imposed`).
+
+The zero of an encoder is known no better than to one of its counts.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from coupled.gap.signals.output import Floats, heard
+from coupled.gap.signals.output import Floats, heard, rounding
 from coupled.gap.thresholds import (
+    COUNTS,
     HELD_AT_MOST,
     HELD_FINER,
     HELD_JUMPS,
@@ -28,10 +32,12 @@ from coupled.gap.thresholds import (
     HELD_WINDOW,
     SLOW_LOADER_s,
 )
-from coupled.record.channels import ControlName, channel
+from coupled.record.channels import ControlName, channel, unit_of
 from coupled.record.record import Record
 from coupled.rig.equations import specified_gradient
 from coupled.rig.rig import Rig
+
+ZEROS = {"deflection": "sensing.deflection_zero_{d}", "force": "sensing.force_zero_N"}
 
 
 def as_driven(rig: Rig, records: Collection[Record], control: ControlName) -> Rig:
@@ -112,3 +118,25 @@ def in_set_points(signal: Floats) -> bool:
     sizes = np.abs(np.diff(signal)[changes])
     uneven = float(np.median(sizes)) > HELD_STEPS * float(sizes.min())
     return uneven and len(moving) > 0 and float(np.mean(moving >= 2)) >= HELD_SHARE
+
+
+def as_counted(rig: Rig, records: Collection[Record], control: ControlName) -> Rig:
+    """Return the rig with zeros that may be off by a count of their channels, where these count.
+
+    A channel counts where its rounding is half of its noise or more. What the file says stays.
+    """
+    known = rig.controls[control].tolerance
+    found = dict(known)
+    for quantity, zero in ZEROS.items():
+        name, key = channel(control, quantity), zero.format(d=unit_of(control))
+        counts = [_count(record, name) for record in records if name in record]
+        if key not in known and counts and max(counts) > 0.0:
+            found[key] = max(counts)
+    return rig if found == known else rig.changed({f"controls.{control}.tolerance": found})
+
+
+def _count(record: Record, name: str) -> float:
+    """Return the size of a channel's count in its unit, 0 where that is little of its noise."""
+    signal = record[name]
+    error = rounding(signal, math.inf)
+    return error * math.sqrt(12.0) if error > COUNTS * heard(signal).rms else 0.0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
@@ -93,7 +93,6 @@ class Output:
     stepped    the prediction runs at the loader's own steps, which wider steps approximate well
     mismatch   gap beyond 1 that errors of the nuisance parameters' laws may cause
     rough      an approximate prediction with fewer replays, for derivatives
-    noises     rms noises of the stage's inputs, by the control's quantity
     unsure     relative amount by which the floor may be too low, from the colour of input noise
     in_series  predicted from the force by loader and linkage in series
     shots      prediction by multiple shooting: short replays, restarted as measured
@@ -115,7 +114,6 @@ class Output:
     stepped: bool = False
     mismatch: float = 0.0
     rough: Predict | None = field(default=None, repr=False, compare=False)
-    noises: Mapping[str, float] = field(default_factory=dict, repr=False, compare=False)
     unsure: float = 0.0
     in_series: bool = False
     shots: Predict | None = field(default=None, repr=False, compare=False)

@@ -172,7 +172,8 @@ def airframe_outputs(
     for i, name in enumerate(compared):
         noise = left_noise(heard(record[name]), record[name], record[name] - flown.motion[:, i])
         own = float(np.hypot(noise.rms, FLIGHT_KNOWN * np.ptp(record[name])))
-        floor = float(np.hypot(own, np.sqrt(np.mean(carried[:, i] ** 2))))
+        moved_by = float(np.sqrt(np.mean(carried[:, i] ** 2)))
+        floor = float(np.hypot(own, moved_by))
         loose = spread([carried[:, i]], own, noise.memory, rig.frame_rate)
 
         def predict(other: Rig, i: int = i, name: str = name, floor: float = floor) -> Floats:
@@ -183,9 +184,8 @@ def airframe_outputs(
             late = other.flight.motion_stamp * other.frame_rate
             return stamped(np.asarray(made.motion[:, i]), late)
 
-        outputs.append(
-            Output("airframe", name, record[name], predict, floor, rig.frame_rate, number, loose)
-        )
+        given = (record[name], predict, floor, rig.frame_rate, number, loose, moved_by / floor)
+        outputs.append(Output("airframe", name, *given))
     if "column" in trims:
         outputs.append(_trim_output(model, record, trims["column"], number))
     return outputs

@@ -18,8 +18,8 @@ from coupled.rig.rig import Rig
 Floats = NDArray[np.float64]
 
 
-def compensated(reading: Reading) -> tuple[str, Floats, Predict, float]:
-    """Return the channel's name, δ̂ as recorded, its prediction by a rig, and its floor, d.
+def compensated(reading: Reading) -> tuple[str, Floats, Predict, float, float]:
+    """Return the channel, δ̂ as recorded, its prediction by a rig, its floor, and F's part of it, d.
 
     The floor is the noise of δc, although the host reads the same noise, because F may be stamped
     slightly late. If the rig's F is late, the record's noise of F may differ from the host's.
@@ -36,10 +36,11 @@ def compensated(reading: Reading) -> tuple[str, Floats, Predict, float]:
     def predict(rig: Rig) -> Floats:
         return made(rig, reading.sensed(rig).as_the_host_had_it(recorded))
 
-    floor = max(reading.heard("computed").rms, ROUNDING_SPAN * float(np.ptp(computed)))
-    rig = reading.rig
+    own = max(reading.heard("computed").rms, ROUNDING_SPAN * float(np.ptp(computed)))
+    rig, carried = reading.rig, 0.0
     if rig.controls[control].sensing.force_stamp != 0.0:
         level, late = reading.driving("force"), reading.sensed(rig).as_the_host_had_it
         shaken = late(unsmoothed(recorded, 0, level)), unsmoothed(late(recorded), 0, level)
-        floor = math.hypot(floor, *(float(np.std(made(rig, f) - predict(rig))) for f in shaken))
-    return reading.name_of("estimate"), reading.signal("estimate"), predict, floor
+        carried = math.hypot(*(float(np.std(made(rig, f) - predict(rig))) for f in shaken))
+    floor, name = math.hypot(own, carried), reading.name_of("estimate")
+    return name, reading.signal("estimate"), predict, floor, carried

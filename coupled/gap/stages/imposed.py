@@ -7,27 +7,19 @@ backlash lie between grip and loader.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
-from functools import cache, partial
-
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.gap.effects.effect import Effect, Parameter, dotted
 from coupled.gap.noise.noise import Noise
 from coupled.gap.noise.smooth import smoothed
 from coupled.gap.signals.floors import with_error
-from coupled.gap.signals.output import Floats, Output, Predict
+from coupled.gap.signals.output import Floats, Predict
 from coupled.gap.signals.reading import Reading
-from coupled.gap.thresholds import JUMP_COUNTED, NOISE_TRIES, PLAY_LEAST, PLAYS, PLAYS_ALIKE
-from coupled.record.channels import ControlName
+from coupled.gap.thresholds import JUMP_COUNTED, NOISE_TRIES
 from coupled.rig.imposed import answer_to, behind_linkage
 from coupled.rig.nodes import Nodes
 from coupled.rig.recorder import stamped
 from coupled.rig.rig import Rig
-
-OF_PLAY = "loader.play"  # key in the rig file, without the unit
 
 
 class Imposed:
@@ -98,62 +90,3 @@ class Imposed:
         """Return the prediction with a sample of the error of the smoothed motion."""
         moved = with_error(self._motion, k, self._level)
         return self.predict(moved, self._force.with_error(k + NOISE_TRIES))(rig)
-
-
-def under_motion(library: Sequence[Effect], imposed: str) -> list[Effect]:
-    """Return a library for imposed motions: the effects of the linkage show in the force.
-
-    If δc is `imposed`, backlash is the only effect of the linkage. Limits of the servo are left
-    out, since the motion of the grip is given.
-    """
-    found = []
-    for effect in library:
-        keys = [p.key for p in effect.parameters]
-        plays = [p for p in effect.parameters if p.key.rpartition("_")[0] == OF_PLAY]
-        if effect.stage != "linkage":
-            sensed = imposed == "deflection" and "linkage" in effect.shows_in
-            found.append(replace(effect, outputs=("loader",)) if sensed else effect)
-        elif plays:
-            if len(keys) == 1:
-                found.append(replace(effect, outputs=("loader",), seen=partial(_plays, plays[0])))
-        elif imposed == "deflection" and not any("servo" in k and "limit" in k for k in keys):
-            found.append(replace(effect, outputs=("loader",)))
-    return found
-
-
-def _plays(
-    number: Parameter, outputs: Sequence[Output], rig: Rig, control: ControlName
-) -> list[dict[str, float]]:
-    """Return the backlashes with the least residual of the force, where a fit starts, by scans.
-
-    The cost has local minima, since the jumps of a backlash move from sample to sample. The force
-    is scanned once as the rig predicts it, and once with a free factor and offset: with an unknown
-    damping the prediction may be far off.
-    """
-    ours = [output for output in outputs if output.stage == "loader"]
-    key = dotted(number.key_on(control), control)
-    filed, travel = rig.controls[control].loader.play, rig.controls[control].travel
-
-    @cache
-    def left(play: float) -> tuple[float, float]:
-        other = rig.changed({key: number.entered(filed, play)})
-        each = [(one.measured / one.floor, one.residual(other, wide=True)) for one in ours]
-        as_filed = sum(float(np.sum(misfit**2)) for _, misfit in each)
-        scaled = sum(_beside_factor(seen, seen - misfit) for seen, misfit in each)
-        return as_filed, scaled
-
-    found = []
-    for i in range(2):
-        rough = np.geomspace(PLAY_LEAST * travel, travel, PLAYS).tolist()
-        best = min(rough, key=lambda play: left(play)[i])
-        fine = (best * np.linspace(0.75, 1.3, PLAYS)).tolist()
-        found.append(min(fine, key=lambda play: left(play)[i]))
-    alike = abs(found[1] - found[0]) < PLAYS_ALIKE * found[0]
-    return [{number.name: play} for play in found[: 1 if alike else 2]]
-
-
-def _beside_factor(seen: Floats, predicted: Floats) -> float:
-    """Return the sum of squares that any positive factor and offset of a prediction leave."""
-    about, moves = seen - seen.mean(), predicted - predicted.mean()
-    power, shared = float(moves @ moves), float(moves @ about)
-    return float(about @ about) - (shared**2 / power if min(power, shared) > 0.0 else 0.0)

@@ -340,11 +340,13 @@ class Reader(Reading):
         linkage = self._made("linkage", name, *made, driven_by, judged=self.judged)
         # A bend adds to δc; with set points the whole motion is the servo's.
         handed_on = None if self.set_points else computed
-        return [replace(linkage, noises={"force": force.noise.rms}, handed_on=handed_on)]
+        return [replace(linkage, handed_on=handed_on)]
 
     def _compensation(self) -> list[Output]:
         """Return δ̂, predicted by the host's equations from δc and F as read."""
-        return [self._output("compensation", *compensated(self))]
+        name, estimate, predict, floor, carried = compensated(self)
+        found = self._output("compensation", name, estimate, predict, floor)
+        return [replace(found, smoothed=carried / floor) if floor else found]
 
     def _surface(self) -> list[Output]:
         points = None if self.rig.flight is None else self.surface_points(self.rig, self.control)

@@ -84,7 +84,7 @@ class Page:
             "run": access.manoeuvre.name,
             "frame_s": host.frame_s,
             "loader": "sim" if host.plan.link is None else host.plan.link.name,
-            "hand": host.plan.wishes.name if host.plan.wishes is not None else "",
+            "hand": host.plan.hand_positions.name if host.plan.hand_positions is not None else "",
             "flown": self._flown,
             "controls": [
                 {

@@ -62,7 +62,7 @@ REQUEST_s = 5.0  # time limit for a connection to send its request
 WORDS_per_s, MOST_WORDS = 10.0, 20  # requests of all viewers, mean and burst; not of hands
 NICE = 10  # increment of the process's nice value
 LARGEST_bytes = 2048
-WORDS = ("stop", "mark", "set", "lead", "save", "hand", "leave")
+WORDS = ("stop", "mark", "set", "service", "save", "hand", "leave")
 
 
 @dataclass(frozen=True)

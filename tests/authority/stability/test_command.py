@@ -41,7 +41,7 @@ def test_a_plane_holds_cells_and_limits(coarse: None) -> None:
         assert crossing.difference is not None
         assert crossing.difference < 0.01
         along = Along(bench(), "column", "frame", crossing.share / K_REPORT)
-        rig, hand = along.posed(crossing.simulated)
+        rig, hand = along.linear_with(crossing.simulated)
         assert growth(rig, hand) == pytest.approx(0.0, abs=0.1)
 
 

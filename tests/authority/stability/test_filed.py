@@ -11,8 +11,9 @@ from rich.console import Console
 
 from coupled.authority.stability.limits import Limit, StabilityLimits, filed
 from coupled.authority.stability.planes import KINDS, Kind, Plane, axis
-from coupled.cli.tables.stability import print_limits
+from coupled.cli.tables import print_table
 from coupled.plots.stability import draw_stability
+from coupled.tables.stability import limits_table
 from tests.support.rigs import bench
 
 SERVO = Limit("servo", "above", 34.4, 34.4, 2.0, 200.0, filed=18.0)
@@ -39,7 +40,8 @@ def test_outside_is_on_the_unstable_side(
 def test_the_table_flags_what_is_filed_outside() -> None:
     console = Console(width=80, record=True)
     good = replace(SERVO, filed=60.0)
-    print_limits(console, [StabilityLimits("column", 2189.0, 0.2, (SERVO, good), ())], None)
+    limits = [StabilityLimits("column", 2189.0, 0.2, (SERVO, good), ())]
+    print_table(console, limits_table(limits, None))
     rows = [line.split() for line in console.export_text().splitlines() if "servo" in line]
     assert [row[-2:] for row in rows] == [["18", "unstable"], ["34.4", "60"]]
 

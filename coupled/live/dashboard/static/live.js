@@ -121,7 +121,7 @@ function services() {
       const unit = (name.match(/_(m|rad|N)$/) || ["", ""])[1];
       label.append(name.replace(/_(m|rad|N)$/, "").replaceAll("_", " ") + (unit ? `, ${unit}` : ""), input);
       input.type = inYesNo(name) ? "checkbox" : "number"; input.step = "any"; input.id = `service-${name}`;
-      input.onchange = () => say({ what: "lead", control: c.name, text: name, value: inYesNo(name) ? +input.checked : +input.value });
+      input.onchange = () => say({ what: "service", control: c.name, text: name, value: inYesNo(name) ? +input.checked : +input.value });
       return label;
     }));
     offered = key;

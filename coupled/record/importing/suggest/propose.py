@@ -107,7 +107,7 @@ def _skeleton(
     """
     if not columns:
         raise InputError(logs[0], "", "none of its columns holds numbers that change")
-    control = next(iter(rig.controls)) if rig is not None else CONTROL_NAMES[0]
+    control = next(iter(rig.controls if rig is not None else ()), CONTROL_NAMES[0])
     listed = ", ".join(_with_range(column, logs) for column in columns[:LISTED])
     more = len(columns) - LISTED
     listed += f" and {more} more" if more > 0 else ""

@@ -1,0 +1,324 @@
+"""A flight that is stepped from outside, a frame at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, replace
+from functools import partial
+from numbers import Real
+from typing import Any, Unpack
+
+from coupled.api.flights import Gradients, Path, Terms, manoeuvre_of, pilots_of
+from coupled.arguments import checks_itself, public
+from coupled.errors import InputError, nearest, shown_value
+from coupled.flight.kept import CachedAircraft, flight_kind, started_aircraft
+from coupled.flight.loop import make_airframe
+from coupled.flight.manoeuvre import Configuration, Manoeuvre
+from coupled.flight.pilot import Pilot
+from coupled.flight.pilot.base import STRONGEST
+from coupled.flight.pilot.own import GivenForce, Law, OwnPilot
+from coupled.flight.started import StartedFlight
+from coupled.flight.state import State, state_of
+from coupled.record.channels import CONTROL_NAMES, ControlName, channel
+from coupled.record.record import EndedEarly, Record
+from coupled.rig.rig import Rig
+from coupled.rig.serving import check_service, set_service
+from coupled.rig.switches import Switches
+
+_LONGEST_s = 7200.0  # of a flight, as of a run
+_FIRST_s = 16.0  # length of the arrays at first; they double
+_NAME = "coupled.Session"
+_CLOSED = "the session is closed; make a new one"
+
+
+@public
+class Session:
+    """A flight that is stepped from outside: one frame, and one `State`, for each `step`.
+
+    Takes what `fly` takes, without a duration. A control without a pilot has the force given to
+    `step`. The record is that of `fly` under the same forces, to the byte. Events, services, wind
+    and gusts act as in a run. Raises InputError as a run file does.
+
+    >>> import coupled
+    >>> with coupled.Session("t37", configuration="uncompensated") as session:
+    ...     while session.time_s < 0.5:
+    ...         pull = 30.0 - 200.0 * session.state.pitch_rate_rad_per_s
+    ...         state = session.step(column_force_N=pull)
+    ...     session.deflection_correction = True
+    ...     state = session.step(column_force_N=30.0)
+    >>> session.record
+    Record(61 rows, 0.508333 s at 120 Hz; 46 channels: time_s, column_force_N, column_computed_m, …)
+    """
+
+    def __init__(
+        self,
+        what: Manoeuvre | Rig | Path,
+        *,
+        column: Pilot | Law | None = None,
+        wheel: Pilot | Law | None = None,
+        pedals: Pilot | Law | None = None,
+        gradient: Gradients | None = None,
+        configuration: Configuration | None = None,
+        **terms: Unpack[Terms],
+    ) -> None:
+        pilots = pilots_of(column, wheel, pedals)
+        if isinstance(what, Manoeuvre):
+            given = manoeuvre_of(what, pilots, None, gradient, terms)
+        else:
+            moved = pilots or {"column": GivenForce()}
+            given = manoeuvre_of(what, moved, _LONGEST_s, gradient, terms)
+        free = dict.fromkeys(given.rig.controls, GivenForce())
+        self._begun = replace(given, pilots={**free, **given.pilots})
+        if configuration is not None:
+            self._begun = self._begun.configured(configuration)
+        self._kept: CachedAircraft | None = None
+        self._closed: Record | None = None
+        self._start(self._begun)
+
+    def _start(self, manoeuvre: Manoeuvre) -> None:
+        """Begin a flight in trim, with the aircraft of the last one if a reset restores it."""
+        kept, kind, rig = self._kept, flight_kind(manoeuvre), manoeuvre.rig
+        if kept is None or kept.kind is None or kept.kind != kind or not kept.restarted():
+            kept = started_aircraft(make_airframe(manoeuvre), kind)
+        self._kept = kept
+        self._capacity = max(2, round(_FIRST_s * rig.frame_rate))
+        flight = StartedFlight(manoeuvre, kept.airframe, self._capacity, stepped=True)
+        self._flight = flight
+        self._services: list[tuple[float, str, str, float]] = []
+        self._switches = Switches(rig, flight.controls, flight.grips, False)
+        names, pilots = list(rig.controls), manoeuvre.pilots
+        self._free = {n: i for i, n in enumerate(names) if type(pilots[n]) is GivenForce}
+        self._has_own = any(isinstance(pilot, OwnPilot) for pilot in pilots.values())
+        self._k = 0
+        self._ended: EndedEarly | None = None
+        self._continue()
+        self._refusal = ""
+        self._quick = not self._has_own and self._free.get("column") == 0
+        self._begin(0)
+        self._look()
+
+    def _continue(self) -> None:
+        """Take the flight's functions, which are other ones for longer arrays."""
+        flight = self._flight
+        self._begin, self._end, self._again = flight.frames.steps()
+        self._own = flight.forces if self._has_own else None
+        self._places, data = flight.places(), flight.data
+        # The rows' bytes, if the record has no channels beside them.
+        plain = len(self._places) == data.shape[1]
+        self._rows = memoryview(data.data).cast("B") if plain else None
+        self._row_bytes = data.strides[0]
+
+    def _look(self) -> None:
+        """Take the state whose host has run."""
+        self._state = state_of(self._places, self._flight.row(self._k))
+
+    def __enter__(self) -> Session:
+        return self
+
+    def __exit__(self, *raised: object) -> None:
+        self.close()
+
+    @property
+    def state(self) -> State:
+        """The state at `time_s`; after the end of the flight, that of its last frame."""
+        return self._state
+
+    @property
+    def time_s(self) -> float:
+        """The time of the flight, s: the frames flown over the frame rate."""
+        return self._k / self._begun.rig.frame_rate
+
+    @property
+    def ended_early(self) -> str:
+        """Why and when the flight ended, as at the ground, or an empty string."""
+        return "" if self._ended is None else str(self._ended)
+
+    @property
+    def rig(self) -> Rig:
+        """The rig with its present switches."""
+        return self._switches.rig
+
+    @property
+    def record(self) -> Record:
+        """The record of the frames flown; the state is the row after its last.
+
+        The manifest has, under `session`, switches and services set from outside.
+        """
+        if self._closed is not None:
+            return self._closed
+        found = self._flight.flown(self._k, self._ended)
+        if not self._switches.changes and not self._services:
+            return found
+        switched = [asdict(change) for change in self._switches.changes]
+        changed = {"session": {"switched": switched, "services": list(self._services)}}
+        return Record(found.channels, found.data, {**found.manifest, **changed})
+
+    @property
+    def deflection_correction(self) -> bool:
+        """Whether the deflection correction is on, on every control; may be set in flight."""
+        return all(c.compensation.deflection for c in self.rig.controls.values())
+
+    @deflection_correction.setter
+    def deflection_correction(self, on: bool) -> None:
+        self._correct("deflection", on)
+
+    @property
+    def gradient_correction(self) -> bool:
+        """Whether the gradient correction is on, on every control; may be set in flight."""
+        return all(c.compensation.gradient for c in self.rig.controls.values())
+
+    @gradient_correction.setter
+    def gradient_correction(self, on: bool) -> None:
+        self._correct("gradient", on)
+
+    @checks_itself
+    def step(
+        self,
+        *,
+        column_force_N: float | None = None,
+        wheel_force_N: float | None = None,
+        pedals_force_N: float | None = None,
+    ) -> State:
+        """Fly one frame and return the state at its end.
+
+        The forces are held over the frame, up to ±5000 N; a pull, right wheel and right pedal are
+        positive. Without its force a hand is off its grip. When the flight ends early, the state is
+        the last one, and another step raises InputError.
+        """
+        forces: Sequence[float]
+        if (
+            self._quick
+            and type(column_force_N) is float
+            and -STRONGEST <= column_force_N <= STRONGEST
+            and wheel_force_N is None
+            and pedals_force_N is None
+        ):
+            forces = (column_force_N, 0.0, 0.0)
+        else:
+            forces = self._forces((column_force_N, wheel_force_N, pedals_force_N))
+        try:
+            self._end(self._k, forces)
+            self._k = k = self._k + 1
+            if k == self._capacity:
+                self._extend()
+            if why := self._begin(k):
+                self._stop(why)
+                return self._state
+        except BaseException:
+            self._refuse(f"was interrupted at {self.time_s:.4g} s; call reset()")
+            raise
+        if self._rows is None:
+            self._look()
+        else:
+            at, size = k * self._row_bytes, self._row_bytes
+            self._state = state_of(self._places, self._rows[at : at + size].tobytes())
+        return self._state
+
+    def _forces(self, given: Sequence[float | None]) -> Sequence[float]:
+        """Return the forces of the rig's controls in its order, N, checked."""
+        if self._refusal:
+            raise InputError(_NAME, "step", self._refusal)
+        found = [0.0, 0.0, 0.0] if self._own is None else list(self._own(self._k))
+        for control, force in zip(CONTROL_NAMES, given, strict=True):
+            if force is not None:
+                found[self._number(control)] = _checked_force(f"{control}_force_N", force)
+        return found
+
+    def _number(self, control: ControlName) -> int:
+        """Return the number of a control whose force is given; raises InputError for another."""
+        if control in self._free:
+            return self._free[control]
+        name, pilots = f"{control}_force_N", self._begun.pilots
+        if control in pilots:
+            problem = f"the {control} has a pilot, {pilots[control].title}; leave one of them out"
+            raise InputError(_NAME, name, problem)
+        raise InputError(_NAME, name, f"the rig has no {control}; {nearest(control, pilots)}")
+
+    def _refuse(self, why: str) -> None:
+        """Refuse further steps."""
+        self._refusal, self._quick = why, False
+
+    def _extend(self) -> None:
+        most = round(_LONGEST_s * self._begun.rig.frame_rate) + 1
+        if self._capacity >= most:
+            raise InputError(_NAME, "step", f"a flight lasts at most {_LONGEST_s:g} s")
+        self._capacity = min(2 * self._capacity, most)
+        self._flight.extend(self._capacity)
+        self._continue()
+
+    def _stop(self, why: str) -> None:
+        self._ended = EndedEarly(why, self.time_s)
+        self._refuse(f"the flight is over: {self._ended}; call reset()")
+
+    def reset(self, seed: int | None = None) -> State:
+        """Return to trim, with the rig as it was at first, and return the state there.
+
+        `seed` is that of the next flight's noise, turbulence and gusts; without it, the session's.
+        The aircraft of a 737, B747, T-37 or F-16 is reset, if nothing but its commands acts on it.
+        JSBSim does not restore others exactly; they are loaded anew.
+        """
+        self._check_open("reset")
+        self._start(self._begun if seed is None else replace(self._begun, seed=seed))
+        return self._state
+
+    def set_switch(self, control: ControlName, switch: str, value: float | bool) -> None:
+        """Change a setting of a control from this frame on, as the page of `coupled live` does.
+
+        `deflection` and `gradient` are True or False; `assumed_bend` and `bend` are K̂ and K in m/N
+        (rad/N), `friction` and `breakout` in N. Raises InputError as a rig file does.
+        """
+        self._check_flying("set_switch")
+        change = partial(self._switches.set, self.time_s, control, switch, value)
+        self._change(change)
+
+    def set_service(self, control: ControlName, service: str, value: float) -> None:
+        """Set a service of a control's loader from this frame on, as an event of a run does.
+
+        Services are those of an event (`jammed`, `trim_m`, `autopilot`, …), in SI. Raises
+        InputError as a run file does.
+        """
+        self._check_flying("set_service")
+        check_service(self.rig, control, service, value, _NAME, "set_service")
+        flight, names = self._flight, list(self._begun.rig.controls)
+        asked = flight.data[: self._k + 1, self._places[channel(control, "estimate")]]
+        flight.served.serve(control, self._capacity, asked)
+        self._continue()
+        self._services.append((self.time_s, control, service, value))
+        self._change(partial(set_service, flight.controls, names, control, service, value))
+
+    def close(self) -> None:
+        """End the session; its record, state and time remain."""
+        if self._closed is None:
+            self._closed = self.record
+            self._refuse(_CLOSED)
+            self._kept = None
+            del self._flight, self._begin, self._end, self._again, self._own
+
+    def _correct(self, which: str, on: bool) -> None:
+        if not isinstance(on, bool):
+            problem = f"is {shown_value(on)}; give True or False"
+            raise InputError(_NAME, f"{which}_correction", problem)
+        for control in self.rig.controls:
+            self.set_switch(control, which, on)
+
+    def _change(self, change: Callable[[], None]) -> None:
+        """Make a change of the controls at this frame, and take the state with it."""
+        self._again(self._k, change)
+        self._look()
+
+    def _check_open(self, what: str) -> None:
+        if self._closed is not None:
+            raise InputError(_NAME, what, _CLOSED)
+
+    def _check_flying(self, what: str) -> None:
+        if self._refusal:
+            raise InputError(_NAME, what, self._refusal)
+
+
+def _checked_force(name: str, force: Any) -> float:
+    """Return a force of any number's type as a float, N; raises InputError for what is none."""
+    number = isinstance(force, Real) and not isinstance(force, bool)
+    if not number or not -STRONGEST <= force <= STRONGEST:
+        problem = f"is {shown_value(force)}; give a force from -{STRONGEST:g} to {STRONGEST:g}"
+        raise InputError(_NAME, name, problem)
+    return float(force)

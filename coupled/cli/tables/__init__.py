@@ -1,1 +1,0 @@
-"""Tables for a terminal of 80 columns."""

@@ -1,0 +1,1 @@
+"""Export of a control's loader as an FMU for co-simulation."""

@@ -1,0 +1,147 @@
+"""Where the fit of an effect starts, as the residuals of a rig show it: hums, ripples and stops.
+
+A ripple is a force that goes as sin or cos of 2π·δc/period. It moves δc by the loader's own
+equation, m·r'' + c·r' + G·r = −F. What that would be is held against the residual for many periods:
+a line in a spectrum, but over the deflection and not over time. So noise counts as it stands in δc,
+where it is white, and not in a force, which the equation would make of it: that is loud at short
+periods.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupled.gap.noise.lines import lines_in, tone_of
+from coupled.gap.noise.smooth import smoothed
+from coupled.gap.signals.output import Floats, Output
+from coupled.gap.thresholds import (
+    RIPPLE_LEAST,
+    RIPPLE_PERIODS,
+    RIPPLES_TRIED,
+    STOP_PASSED,
+    HUM_FROM_Hz,
+)
+from coupled.record.channels import ControlName, channel
+from coupled.rig.rig import Rig
+
+Complex = NDArray[np.complex128]
+
+
+def hums(outputs: Sequence[Output], rig: Rig, control: ControlName) -> list[dict[str, float]]:
+    """Return amplitude in d, frequency in Hz and phase in rad of the hum that shows most, if any.
+
+    By the first record: of the others each has a phase of its own (`sensed`).
+    """
+    ours = [output for output in outputs if output.stage == "loader"]
+    if not ours:
+        return []
+    first = ours[0]
+    for line in lines_in(first.residual(rig) * first.floor):
+        seen_Hz = line.turn * first.frame_rate_Hz / (2.0 * math.pi)
+        tone_Hz = tone_of(seen_Hz, first.frame_rate_Hz)
+        if tone_Hz < HUM_FROM_Hz:
+            continue
+        turns = tone_Hz / first.frame_rate_Hz * 2.0 * math.pi
+        # Folded from beyond an odd half of the frame rate, a tone runs backwards.
+        backwards = math.cos(turns - line.turn) < math.cos(turns + line.turn)
+        phase = math.remainder(math.pi - line.phase, 2.0 * math.pi) if backwards else line.phase
+        return [
+            {"amplitude_{d}": line.amplitude, "frequency_Hz": tone_Hz, "phase_rad": phase},
+        ]
+    return []
+
+
+def ripples(outputs: Sequence[Output], rig: Rig, control: ControlName) -> list[dict[str, float]]:
+    """Return amplitude in N, period in d and phase in rad of the ripples that show most, if any.
+
+    The one that takes most of the residual comes first.
+    """
+    ours = [
+        output for output in outputs if output.stage == "loader" and "force" not in output.channel
+    ]
+    if not ours:
+        return []
+    ways = [smoothed(output.measured) for output in ours]
+    answers = [_answer(output, rig, control) for output in ours]
+
+    def moved(forces: Sequence[Floats] | Sequence[Complex]) -> Complex:
+        each = zip(answers, forces, strict=True)
+        return np.concatenate([np.fft.ifft(answer * np.fft.fft(force)) for answer, force in each])
+
+    laws = [[np.ones_like(w), w, np.abs(w), w**3] for w in ways]
+    smooth = np.column_stack([moved(law).real for law in zip(*laws, strict=True)])
+    smooth = np.linalg.qr(smooth)[0]
+    left = np.concatenate([output.residual(rig) * output.floor for output in ours])
+    left = left - smooth @ (smooth.T @ left)
+    span = max(float(np.ptp(way)) for way in ways)
+    periods = span / np.arange(RIPPLE_LEAST, RIPPLE_PERIODS, 0.25)
+    waves = []
+    for period in periods.tolist():
+        turned = moved([np.exp(2j * np.pi * way / period) for way in ways])
+        both = np.column_stack((turned.imag, turned.real))  # by sin and by cos
+        waves.append(_wave(both - smooth @ (smooth.T @ both), left, period))
+    taken = np.array([0.0, *(wave.taken for wave in waves), 0.0])
+    peaks = np.flatnonzero((taken[1:-1] > taken[:-2]) & (taken[1:-1] >= taken[2:]))
+    best = sorted(peaks.tolist(), key=lambda k: -waves[k].taken)[:RIPPLES_TRIED]
+    return [waves[k].values for k in best]
+
+
+class _Wave(NamedTuple):
+    """A ripple's values, and what it takes of the residual's power."""
+
+    values: dict[str, float]
+    taken: float
+
+
+def _wave(both: Floats, left: Floats, period: float) -> _Wave:
+    """Return the ripple of one period by what its sine and cosine move, and what is left."""
+    sine, cosine = np.linalg.lstsq(both, left, rcond=None)[0]
+    values = {
+        "ripple_N": float(np.hypot(sine, cosine)),
+        "period_{d}": period,
+        "phase_rad": float(np.arctan2(cosine, sine)),
+    }
+    return _Wave(values, float(left @ (both @ np.array([sine, cosine]))))
+
+
+def _answer(output: Output, rig: Rig, control: ControlName) -> Complex:
+    """Return how the loader answers a force against it at each frequency of a transform, d/N."""
+    data = rig.controls[control]
+    turns = 2.0 * np.pi * np.fft.fftfreq(len(output.measured), 1.0 / output.frame_rate_Hz)
+    gradient = float(np.mean(data.schedule.total_gradient))
+    stiff = gradient + 1j * turns * data.loader.damping - turns**2 * data.loader.mass
+    return np.asarray(-1.0 / np.where(stiff == 0.0, np.inf, stiff))
+
+
+def stops(outputs: Sequence[Output], rig: Rig, control: ControlName) -> list[dict[str, float]]:
+    """Return where the control stops aft and forward, d, in one entry; none where nothing stops it.
+
+    A stop is met where the nominal rig goes beyond every measured place. There the control rests
+    at it, and the median of what is measured is the stop. A side that is not met has the travel.
+    """
+    travels = (rig.controls[control].pull, rig.controls[control].push)
+    names = [channel(control, quantity) for quantity in ("computed", "deflection")]
+    ours = [o for o in outputs if o.stage == "loader" and o.channel in names]
+    found: dict[str, float] = {}
+    sides = (("aft_{d}", 1.0), ("forward_{d}", -1.0))
+    for (name, side), travel in zip(sides, travels, strict=True):
+        places = [_met(output, rig, side) for output in ours]
+        met = [place for place in places if place is not None]
+        found[name] = min([*met, travel])
+    return [found] if ours and tuple(found.values()) != travels else []
+
+
+def _met(output: Output, rig: Rig, side: float) -> float | None:
+    """Return how far out a record's stop on one side lies, d; None where it meets none."""
+    measured = side * output.measured
+    predicted = measured - side * output.residual(rig) * output.floor
+    furthest = float(np.max(measured))
+    held = predicted > furthest + STOP_PASSED * float(np.ptp(measured))
+    if furthest <= 0.0 or not held.any():
+        return None
+    return max(float(np.median(measured[held])), 0.0) or None

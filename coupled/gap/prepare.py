@@ -1,0 +1,155 @@
+"""Prepare records for a diagnosis: how the machine is driven, where it trims, what can be judged.
+
+Everything that depends on the records alone is decided here, once: the rig as it was driven and
+trimmed, the outputs of its stages with their noise floors, and the effects that can be tried.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+
+from coupled.errors import InputError
+from coupled.gap.checks import check_record, check_trim
+from coupled.gap.effects.effect import Effect
+from coupled.gap.effects.library import library_of
+from coupled.gap.findings.healthy import Baseline
+from coupled.gap.search.case import Case, Tell
+from coupled.gap.search.contact import allowing_for_contact
+from coupled.gap.signals.drives import as_counted, as_driven
+from coupled.gap.signals.live import judged_part, live_of
+from coupled.gap.signals.output import Output
+from coupled.gap.signals.reading import worth_recording
+from coupled.gap.stages.airframe import Flights, airframe_outputs
+from coupled.gap.stages.stages import Reader
+from coupled.gap.stages.surfaces import surface_points
+from coupled.gap.stages.tried import tried_effects
+from coupled.gap.thresholds import RIGS_KEPT
+from coupled.gap.trimmed import trim_speed, trimmed
+from coupled.parallel import in_threads
+from coupled.record.channels import ControlName
+from coupled.record.record import Record
+from coupled.rig.rig import Rig
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """Records of one control of a rig, ready to be searched for effects.
+
+    `case` holds the rig and the outputs, `library` the effects that can be tried. `trim` and
+    `left_out` are sentences: what was taken from the records' trim, and what of live records is not
+    judged. `baseline` is the healthy machine, where its records were given.
+    """
+
+    case: Case
+    library: tuple[Effect, ...]
+    readers: tuple[Reader, ...]
+    records: Mapping[str, Record]
+    trim: str = ""
+    left_out: tuple[str, ...] = ()
+    baseline: Baseline | None = None
+
+
+def prepare(
+    rig: Rig,
+    records: Mapping[str, Record],
+    control: ControlName = "column",
+    tell: Tell | None = None,
+    baseline: Baseline | None = None,
+) -> Prepared:
+    """Return records prepared for a diagnosis, by their files' names.
+
+    With a `baseline`, the rig is that of the healthy machine, and its error raises the noise
+    floors. Raises InputError where a record cannot be of this rig, or lets no stage be judged.
+    """
+    if baseline is not None:
+        rig = baseline.rig
+    live = [one for one in map(live_of, records.values()) if one is not None]
+    records = {file: judged_part(record, file) for file, record in records.items()}
+    rig = as_driven(rig, list(records.values()), control) if control in rig.controls else rig
+    rig, trim = trimmed(rig, records)
+    for file, record in records.items():
+        check_record(rig, record, control, file)
+        if rig.flight is not None:
+            check_trim(trim_speed(rig), record, file)
+    rig = as_counted(rig, list(records.values()), control)
+    judged = Judged(rig, readers_of(rig, records, control), baseline)
+    outputs = [
+        allowing_for_contact(output.halved(rig), rig, control) for output in judged.under(rig)
+    ]
+    if not outputs:
+        raise InputError(next(iter(records)), "", _too_little(rig, control, judged.readers))
+    library = tried_effects(library_of(rig, control), judged.readers, outputs)
+    return Prepared(
+        Case(rig, control, outputs, tell, judged.under, only_wide=baseline is not None),
+        tuple(library),
+        tuple(judged.readers),
+        records,
+        trim,
+        tuple(dict.fromkeys(words for one in live for words in one.left_out)),
+        baseline,
+    )
+
+
+def readers_of(rig: Rig, records: Mapping[str, Record], control: ControlName) -> list[Reader]:
+    """Return what builds the outputs of each record, in their order."""
+    each = enumerate(records.values())
+    return [Reader(rig, record, control, surface_points, number) for number, record in each]
+
+
+@dataclass(frozen=True)
+class Judged:
+    """The outputs that records let judge, by the rig that their noise floors are estimated with.
+
+    Where the surfaces and the aircraft stay as they are, the airframe's are not flown again. The
+    outputs of the last rigs are kept: each takes as long again.
+    """
+
+    rig: Rig
+    readers: Sequence[Reader]
+    baseline: Baseline | None = None
+    _flights: dict[int, Flights] = field(default_factory=dict, repr=False, compare=False)
+    _flown: list[Output] = field(default_factory=list, repr=False, compare=False)
+    _known: list[tuple[Rig, list[Output]]] = field(default_factory=list, repr=False, compare=False)
+
+    def under(self, rig: Rig) -> list[Output]:
+        """Return the outputs with the noise floors that a rig has."""
+        known = next((made for other, made in self._known if other == rig), None)
+        if known is None:
+            known = self._made(rig)
+            self._known[:] = [*self._known[1 - RIGS_KEPT :], (rig, known)]
+        return known
+
+    def _made(self, rig: Rig) -> list[Output]:
+        readers = [replace(reader, rig=rig) for reader in self.readers]
+        makers: list[Callable[[], list[Output]]] = [reader.outputs for reader in readers]
+        alike = bool(self._known) and _fly_alike(self.rig, rig)
+        for one in () if alike else readers:
+            flights = self._flights.setdefault(one.number, Flights())
+            makers.append(partial(airframe_outputs, one.rig, one.record, one.number, flights))
+        made = [output for each in in_threads(lambda make: make(), makers) for output in each]
+        if alike:
+            made += self._flown
+        elif rig == self.rig:
+            self._flown[:] = [output for output in made if output.stage == "airframe"]
+        return made if self.baseline is None else self.baseline.raised(made)
+
+
+def _fly_alike(one: Rig, other: Rig) -> bool:
+    """Tell whether two rigs' surfaces and aircraft are the same."""
+    rigged = all(
+        one.controls[name].rigging == other.controls[name].rigging for name in one.controls
+    )
+    return rigged and one.flight == other.flight
+
+
+def _too_little(rig: Rig, control: ControlName, readers: Sequence[Reader]) -> str:
+    """Return what records lack of which no stage can be judged, in words."""
+    lacking = {
+        name
+        for reader in readers
+        for stage, names in reader.missing().items()
+        for name in worth_recording(rig, control, stage, names)
+    }
+    return f"holds too little to judge any stage by; it lacks {', '.join(sorted(lacking))}"

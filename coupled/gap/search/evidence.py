@@ -1,0 +1,136 @@
+"""The criterion by which sets of effects are compared: the log evidence of a set, given the record.
+
+For a set E of effects with parameters θ, nuisance parameters φ, and outputs o of N_o frames each:
+
+    ln Z(E) = Σ_o L_o + ln P(E) + ln p(φ̂) − ½·ln det(I + S·H·S)
+
+    L_o  = −N_o/(2·τ_o)·m(q_o)        log-likelihood with N_o/τ_o effective samples
+    q_o  = mean(r_o²)/v_o             r_o: residual over the noise floor, at the fitted parameters
+    m(q) = ln q where q > 1           the residual's own variance is estimated: noise or misfit
+           q − 1 elsewhere            no residual is smaller than the noise that is known
+    v_o  = 1 + (ε·(g_o − 1))²         the physics' own error: ε of the residual without effects, g_o
+    ln P(E) = −Σ_effects (A + B·(parameters − 1))
+    p(φ)    the Gaussian priors of the nuisance parameters, relative to their maximum
+    H = Σ_o J_oᵀJ_o/(τ_o·max(q_o, 1))  information matrix of the log-likelihood
+    S = diag(s)                       prior widths, so that s·√(2π) is 1/(prior density at the fit)
+
+Where the floor holds the error of a model of the healthy machine, which is no noise, a residual
+below it is no evidence, and q_o is 1 at least.
+
+The last term is Laplace's: how much of the prior volume the data leave. A size's prior is uniform
+in its logarithm over Λ = ln 10⁴, so s = |θ̂ − θ₀|·Λ/√(2π), with θ₀ where the effect does nothing; it
+is no less than that of the size's own standard error. The evidence is then the same in any unit.
+The prior of a nuisance parameter is its Gaussian, or uniform between its bounds.
+
+τ_o is the integrated autocorrelation time (`memory`) of the residual of the set that leaves least
+of output o, the same for all sets: a worse set's longer memory is no reason to count its misfit
+less.
+
+MacKay, Information Theory, Inference, and Learning Algorithms (2003), ch. 28, has the theory.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupled.gap.effects.effect import Effect, Parameter
+from coupled.gap.search.found import Fit, Group
+from coupled.gap.search.problem import Problem
+from coupled.gap.signals.output import Output, memory
+from coupled.gap.thresholds import PRIOR_EFFECT, PRIOR_NUMBER, PRIOR_SPAN
+
+Floats = NDArray[np.float64]
+
+
+def misfit(square: Floats) -> Floats:
+    """Return −2 log-likelihood a sample of residuals with these mean squares, less that of 1."""
+    return np.where(square > 1.0, np.log(np.maximum(square, 1.0)), square - 1.0)
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What the evidence of a set consists of: `rest` are all terms but Σ L_o.
+
+    `squares` are q_o, `samples` N_o/τ_o by the set's own residuals, shape (outputs,).
+    """
+
+    squares: Floats
+    samples: Floats
+    rest: float
+
+    def log(self, samples: Floats) -> float:
+        """Return ln Z with so many effective samples of each output, shape (outputs,)."""
+        return self.rest - 0.5 * float(samples @ misfit(self.squares))
+
+
+def fewest_unexplained(known: Sequence[Evidence]) -> Floats:
+    """Return N_o/τ_o, each by the set that leaves least of output o, shape (outputs,)."""
+    squares = np.array([one.squares for one in known])
+    counts = np.array([one.samples for one in known])
+    return np.asarray(counts[np.argmin(squares, axis=0), np.arange(squares.shape[1])])
+
+
+def evidence(problem: Problem, fitted: Fit, variance: Floats) -> Evidence:
+    """Return the evidence of the set of a fit; `variance` is v_o, shape (outputs,)."""
+    lefts = [output.residual(fitted.rig) for output in problem.outputs]
+    squares = np.array([float(np.mean(left**2)) for left in lefts]) / variance
+    if problem.case.only_wide:
+        squares = np.maximum(squares, 1.0)
+    counts = np.array([len(left) / memory(left) for left in lefts])
+    rest = sum(
+        _laplace(problem, members, group) - group.penalty
+        for members, group in fitted.groups.items()
+    )
+    return Evidence(squares, counts, rest + sum(map(log_prior, fitted.effects)))
+
+
+def log_prior(effect: Effect) -> float:
+    """Return the log prior probability of an effect, relative to its absence."""
+    return -PRIOR_EFFECT - PRIOR_NUMBER * max(len(effect.free) - 1, 0)
+
+
+def _laplace(problem: Problem, members: Sequence[Effect], group: Group) -> float:
+    """Return Laplace's term of the parameters that were fitted together."""
+    if not group.values or not group.low:
+        return 0.0
+    numbers = {one.value_key(p): p for one in members for p in one.free}
+    width = np.array([_width(problem, numbers[key], group, key) for key in group.values])
+    scaled = group.information * np.outer(width, width)
+    _, logarithm = np.linalg.slogdet(np.eye(len(width)) + scaled)
+    return -0.5 * float(logarithm)
+
+
+def _width(problem: Problem, p: Parameter, group: Group, key: str) -> float:
+    """Return the width s of a parameter's prior at its fitted value, in its unit."""
+    prior = problem.priors.get(key)
+    if prior is not None:
+        return prior.sigma
+    case = problem.case
+    low, high = p.bounds(case.nominal, case.control)
+    flat = (high - low) / math.sqrt(2.0 * math.pi)
+    if p.may_end:
+        return flat
+    value = group.values[key]
+    none = p.base(case.nominal, case.control) if p.above else p.neutral(case.nominal, case.control)
+    size = abs(value) if p.inverse else abs(value - none)
+    error = 0.5 * (group.high[key] - group.low[key]) / 1.96
+    size = min(max(size, error), flat) if math.isfinite(error) else flat
+    return size * PRIOR_SPAN / math.sqrt(2.0 * math.pi)
+
+
+def likelier_by(outputs: Sequence[Output], right: Fit, wrong: Fit) -> float:
+    """Return the log-likelihood by which the `right` fit of whole records beats the `wrong` one.
+
+    Effective samples are counted by the autocorrelation time of what the right one leaves.
+    """
+    gain = 0.0
+    for output in outputs:
+        lefts = output.residual(right.rig), output.residual(wrong.rig)
+        better, worse = misfit(np.array([float(np.mean(left**2)) for left in lefts]))
+        gain += 0.5 * len(lefts[0]) / memory(lefts[0]) * float(worse - better)
+    return gain

@@ -1,0 +1,93 @@
+"""What a search found: fits, the best set of effects, and what may take each effect's place."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupled.gap.effects.effect import Effect
+from coupled.gap.search.slopes import Slope
+from coupled.rig.rig import Rig
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Group:
+    """The fit of effects that share outputs: values and 95 % interval by "effect.parameter".
+
+    `cost` is half the weighted sum of squares in noise floors, without the priors. `information` is
+    that of the log-likelihood, in the parameters' own units, without the priors. `penalty` is the
+    log density of the nuisance parameters below its maximum. `slope` is that of the outputs that
+    it touches, in noise floors.
+    """
+
+    values: dict[str, float]
+    low: dict[str, float]
+    high: dict[str, float]
+    at_bound: tuple[str, ...]
+    cost: float
+    information: Floats
+    penalty: float = 0.0
+    slope: Slope | None = field(default=None, repr=False, compare=False)
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A fitted set of effects: `values`, `low`, `high` (95 %) by "effect.parameter".
+
+    `at_bound` are the parameters at a bound, or undetermined; `cost` is half the weighted sum of
+    squares, in noise floors. `groups` are the parts that share no output.
+    """
+
+    effects: tuple[Effect, ...]
+    values: Mapping[str, float]
+    low: Mapping[str, float]
+    high: Mapping[str, float]
+    at_bound: tuple[str, ...]
+    rig: Rig
+    cost: float
+    groups: Mapping[tuple[Effect, ...], Group] = field(default_factory=dict, compare=False)
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """An effect that may take another's place, its gain in log evidence, and the set's fit."""
+
+    gain: float
+    effect: Effect
+    fit: Fit
+
+
+@dataclass(frozen=True)
+class Found:
+    """One effect of the best set.
+
+    `gain` is the log evidence that is lost without it, `probability` that of all sets that contain
+    it, `rivals` the effects that take its place in sets within `RIVAL_GAIN` of the best.
+    """
+
+    effect: Effect
+    gain: float
+    probability: float
+    rivals: tuple[Candidate, ...]
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What a search found: the effects of the best set, and their fit.
+
+    `settled` is the fit without effects, its nuisance parameters within their tolerance; `tried`
+    the gain in log evidence of each effect alone, `rounds` that of the sets of each depth, by the
+    effect added, `probability` the posterior probability of the best set.
+    """
+
+    steps: tuple[Found, ...]
+    fit: Fit
+    settled: Fit
+    tried: dict[str, float] = field(default_factory=dict)
+    rounds: tuple[dict[str, float], ...] = ()
+    probability: float = 1.0

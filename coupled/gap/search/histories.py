@@ -1,0 +1,136 @@
+"""The search that a diagnosis uses, of sets and then of time histories, and each effect's history.
+
+A set of constant effects is searched first (`beam`). Where it leaves a stage unexplained, the time
+history of each effect that gained most is estimated. If one begins within the record, the outputs
+are predicted with its time history, and the search is repeated.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from coupled.gap.effects.effect import Effect, touched
+from coupled.gap.effects.library import BY_NAME
+from coupled.gap.search.beam import search_sets
+from coupled.gap.search.case import Case
+from coupled.gap.search.course import Bounds, Course, course_of, course_of_events, timing_of
+from coupled.gap.search.found import Choice, Fit
+from coupled.gap.search.problem import Problem
+from coupled.gap.signals.output import Floats, explained_below, stage_limits
+from coupled.gap.thresholds import BEGUN, LATER_LEFT, LATER_TRIED, COURSE_WINDOW_s
+from coupled.record.record import Record
+
+Parts = list[tuple[Floats, Floats]]  # of each output, what the effect does, and what is left
+
+
+def search(case: Case, library: Sequence[Effect]) -> tuple[Case, Choice]:
+    """Return the effects that explain a record's gap, and the case with its last noise floors."""
+    found = search_sets(case, library)
+    while (later := _later(*found, library)) is not None:
+        found = later
+    return found
+
+
+def _later(case: Case, found: Choice, library: Sequence[Effect]) -> tuple[Case, Choice] | None:
+    """Return the search with an effect that begins in the record, where that explains far more.
+
+    The other effects found may only compensate for what the time history explains. One that grows
+    late may gain nothing as a constant: without any effect found, those that did best are tried.
+    """
+    open_outputs = _open_outputs(case, found)
+    gains = {step.effect.name: step.gain for step in found.steps} or found.tried
+    for name in sorted(gains, key=lambda one: -gains[one])[:LATER_TRIED]:
+        effect = BY_NAME[name]
+        anew = in_time(effect, case) if open_outputs & set(effect.shows_in) else None
+        if anew is None:
+            continue
+        after, choice = search_sets(anew, library)
+        kept = any(after.timing(one) is not None for one in choice.fit.effects)
+        if kept and _left(after, choice) < LATER_LEFT * _left(case, found):
+            return after, choice
+    return None
+
+
+def _open_outputs(case: Case, choice: Choice) -> set[str]:
+    """Return the outputs of which the effects found leave more than noise and physics' error."""
+    first, limits = case.gaps(choice.settled.rig), stage_limits(case.outputs)
+    left = case.gaps(choice.fit.rig)
+    return {at for at, gap in left.items() if gap > explained_below(first[at], limits[at])}
+
+
+def _left(case: Case, choice: Choice) -> float:
+    """Return the sum of the outputs' mean squares over their noise's, less 1 each."""
+    return sum(output.gap(choice.fit.rig) ** 2 - 1.0 for output in case.outputs)
+
+
+def course_in(effect: Effect, case: Case, found: Fit, records: list[Record]) -> Course | None:
+    """Return the course of an effect in the record that holds most of its action.
+
+    None of an effect without a number, of one of several records whose course is the same all the
+    time, and of a limit, whose action does not go with its size.
+    """
+    if not effect.free:
+        return None
+    parts = _parts(effect, case, found)
+    if not parts:
+        return None
+    most = max(parts, key=lambda k: sum(float(action @ action) for action, _ in parts[k]))
+    record, rate_Hz = records[most], case.nominal.frame_rate
+    if effect.sampled is not None and effect.sampled.times is not None:
+        at_s = effect.sampled.times(record)
+        return course_of_events(at_s, len(record) / rate_Hz) if at_s.size else None
+    if effect.free[0].inverse:
+        return None
+    value = _size(effect, case, found)
+    begun = case.timing(effect)
+    if begun is not None:
+        return begun[0].course(begun[1], len(record) / rate_Hz, value)
+    return course_of(parts[most], rate_Hz, value, effect.gradual)
+
+
+def in_time(effect: Effect, case: Case) -> Case | None:
+    """Return the case with an effect that begins within the one record, at once or straight.
+
+    None where it was there from the first, or has no size. The effect is fitted alone: others may
+    only have taken up what its course leaves.
+    """
+    number = effect.free[0] if effect.free else None
+    sized = number is not None and not number.inverse and not effect.gradual
+    events = effect.sampled is not None and effect.sampled.times is not None
+    if not sized or events or case.timing(effect) is not None:
+        return None
+    alone = Problem(case).fit((effect,))
+    parts = _parts(effect, case, alone)
+    if len(parts) != 1:
+        return None
+    ((_, ours),) = parts.items()
+    rate_Hz = case.nominal.frame_rate
+    seen = course_of(ours, rate_Hz, _size(effect, case, alone), effect.gradual)
+    # What changes from the first may be anything that drifts: it is said, and no cause.
+    if seen.onset_s is None or seen.onset_s.low < BEGUN * COURSE_WINDOW_s:
+        return None
+    anew = case.timed(effect, timing_of(ours, rate_Hz), seen.onset_s)
+    # By what it does at its true size: friction and play do not go straight with theirs.
+    ((_, ours),) = _parts(effect, case, Problem(anew).fit((effect,))).items()
+    return case.timed(effect, timing_of(ours, rate_Hz), seen.onset_s)
+
+
+def _parts(effect: Effect, case: Case, found: Fit) -> dict[int, Parts]:
+    """Return {record: what an effect does there in each output, and what is left}, in floors."""
+    without = case.with_only(found, [other for other in found.effects if other is not effect])
+    parts: dict[int, Parts] = {}
+    for output in touched(case.outputs, [effect]):
+        left = output.residual(found.rig)
+        action = output.residual(without) - left
+        parts.setdefault(output.record, []).append((action, left))
+    return parts
+
+
+def _size(effect: Effect, case: Case, found: Fit) -> Bounds:
+    """Return an effect's first number, less what does nothing."""
+    first = effect.free[0]
+    key, nothing = effect.value_key(first), first.neutral(case.nominal, case.control)
+    each = (bound.get(key, np.nan) for bound in (found.values, found.low, found.high))
+    return Bounds(*(float(bound - nothing) for bound in each))

@@ -1,0 +1,149 @@
+"""What the search over sets works on: a case, with priors for its nuisance parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupled.gap.effects.effect import Effect, possible
+from coupled.gap.effects.library import BY_NAME
+from coupled.gap.effects.settings import is_dry
+from coupled.gap.search.case import Case
+from coupled.gap.search.descent import WHOLE, Descent
+from coupled.gap.search.fit import fit_set
+from coupled.gap.search.found import Fit
+from coupled.gap.signals.output import Output, Part, stage_gaps, stage_limits
+from coupled.gap.thresholds import MISMATCH
+from coupled.rig.rig import Rig
+
+Floats = NDArray[np.float64]
+EXACT = ("schedule", "compensation", "linkage")  # the host's arithmetic; laws solved exactly
+NORMAL_95 = 1.96  # standard deviations from the mean to an end of a 95 % interval
+
+
+class Prior(NamedTuple):
+    """The Gaussian prior of a nuisance parameter, in the parameter's own unit."""
+
+    mean: float
+    sigma: float
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A case whose nuisance parameters have priors in place of limits.
+
+    The tolerance of a rig file's number is the 95 % interval of its prior.
+    """
+
+    case: Case
+    _known: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
+
+    @property
+    def outputs(self) -> Sequence[Output]:
+        """The outputs that are judged."""
+        return self.case.outputs
+
+    @cached_property
+    def nuisances(self) -> tuple[Effect, ...]:
+        """The nuisance parameters on which the outputs depend, each as an effect."""
+        return tuple(_unlimited(name, one) for name, one in self.case.settings.items())
+
+    @cached_property
+    def priors(self) -> dict[str, Prior]:
+        """The nuisance parameters' priors, by "effect.parameter"."""
+        found = {}
+        for one in self.case.settings.values():
+            (p,) = one.free
+            half = max(p.high - p.starts[0], p.starts[0] - p.low)
+            found[one.value_key(p)] = Prior(p.starts[0], half / NORMAL_95)
+        return found
+
+    def beside(self, effects: Sequence[Effect]) -> list[Effect]:
+        """Return the nuisance parameters of a set: those whose number no effect of it frees.
+
+        How the filed friction yields is one where the rig as filed leaves a gap.
+        """
+        freed = {p.key for effect in effects for p in effect.parameters}
+        free = list(self.nuisances)
+        if any(e.dry for e in effects) or is_dry(self.case.nominal, self.case.control):
+            free += [one for one in self.case.contact if self._may_yield(one, effects)]
+        return [one for one in free if freed.isdisjoint(p.key for p in one.free)]
+
+    def _may_yield(self, contact: Effect, effects: Sequence[Effect]) -> bool:
+        return any(e.dry for e in effects) or self.case.is_open(contact)
+
+    def fit(
+        self,
+        effects: Sequence[Effect],
+        start: Mapping[str, float] | None = None,
+        parent: Fit | None = None,
+        descent: Descent = WHOLE,
+        near: Fit | None = None,
+        part: Part = "all",
+    ) -> Fit:
+        """Return a set fitted together with the nuisance parameters, to the whole record or a part.
+
+        Groups of effects that `parent` has as well, at the same values, are taken over. `near` is a
+        fit of the set that ended at the start.
+        """
+        free = self.beside(effects)
+        begun = self.case.with_contact(effects, free, start or {})
+        slopes = {} if near is None else {tuple(g.values): g.slope for g in near.groups.values()}
+        known = replace(descent, known=self._known, slopes=slopes)
+        return fit_set(self.case, effects, free, self.priors, begun, parent, known, part)
+
+    def rig_of(self, effects: Sequence[Effect], values: Mapping[str, float]) -> Rig | None:
+        """Return the rig with a set of these values, None where the physics cannot give it."""
+        every = (*effects, *self.beside(effects))
+        known = {**self.case.neutral, **values}
+        return possible(self.case.nominal, self.case.control, every, known)
+
+    def within_tolerance(self, found: Fit) -> Fit:
+        """Return a fit with its nuisance parameters within their 95 %."""
+        values = dict(found.values)
+        for key, prior in self.priors.items():
+            if key in values:
+                half = NORMAL_95 * prior.sigma
+                values[key] = min(max(values[key], prior.mean - half), prior.mean + half)
+        rig = self.rig_of(found.effects, values)
+        return found if rig is None else replace(found, values=values, rig=rig)
+
+    def surely_open(self, settled: Rig) -> Problem:
+        """Return the problem in which a gap that this rig leaves is held to noise alone."""
+        anew = Problem(self.case.surely_open(settled))
+        anew._known.update(self._known)  # no fit asks for a limit
+        return anew
+
+    def over_limit(self, rig: Rig) -> set[str]:
+        """Return the outputs of which a rig leaves more than noise may, by the noise known."""
+        gaps, limits = stage_gaps(self.outputs, rig), stage_limits(self.outputs)
+        return {at for at, gap in gaps.items() if gap > limits[at]}
+
+    @cached_property
+    def by_shots(self) -> Problem | None:
+        """The problem with outputs predicted by short replays; None where none has them."""
+        short = self.case.by_shots
+        return None if short is None else Problem(short)
+
+    def variances(self, without: Rig) -> Floats:
+        """Return the variance of each output's residual, noise floors², shape (outputs,).
+
+        The noise's, and that of the physics' own error: a share of what the rig without effects
+        leaves. The host's arithmetic is exact, and servo, play and bend are solved exactly.
+        """
+        gaps = np.array([output.gap(without) for output in self.outputs])
+        error = np.array([0.0 if one.stage in EXACT else MISMATCH for one in self.outputs])
+        return np.asarray(1.0 + (error * np.maximum(gaps - 1.0, 0.0)) ** 2)
+
+
+def _unlimited(name: str, setting: Effect) -> Effect:
+    """Return a nuisance parameter between the bounds of the effect that frees the same number."""
+    (p,) = setting.free
+    wide = BY_NAME[name].free[0]
+    low, high = min(p.low, wide.low), max(p.high, wide.high)
+    return replace(setting, parameters=(replace(p, low=low, high=high, may_end=True),))

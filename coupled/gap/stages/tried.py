@@ -1,0 +1,163 @@
+"""Which effects records let be tried, and in which outputs each shows there.
+
+The library says in which stages an effect shows. What a record holds changes that:
+
+    loader and linkage in series   the linkage's effects show in the loader's output
+    imposed motion                 they show in the force; the motion of the grip is given
+    set points                     a commanded number has no sensor, and the servo has reached the
+                                   speed that the grip was measured at
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import replace
+from functools import cache, partial
+
+import numpy as np
+
+from coupled.gap.effects.effect import Effect, Parameter, dotted
+from coupled.gap.effects.scales import Scales, in_scale
+from coupled.gap.signals.output import Floats, Output, heard
+from coupled.gap.stages.stages import Reader
+from coupled.gap.thresholds import PLAY_LEAST, PLAYS, PLAYS_ALIKE, REACHED_BEYOND, REACHED_OVER
+from coupled.record.channels import ControlName, channel
+from coupled.record.record import Record
+from coupled.rig.rig import Rig
+
+OF_PLAY = "loader.play"  # its key in a rig file without the unit
+RATE_LIMIT = "loader.servo_rate_limit_{d}_per_s"
+
+
+def tried_effects(
+    library: Sequence[Effect], readers: Sequence[Reader], outputs: Sequence[Output]
+) -> list[Effect]:
+    """Return the effects that records let be tried, with the outputs in which they show."""
+    records, control = [reader.record for reader in readers], readers[0].control
+    known = [effect for effect in library if effect.can_be_tried(records, control)]
+    known = as_judged(known, readers, outputs)
+    known = in_scale(known, Scales.of(readers), readers[0].rig, control)
+    if readers[0].set_points:
+        known = _under_set_points(known, records, control)
+    judged = {output.stage for output in outputs}
+    return [effect for effect in known if judged & {*effect.shows_in}]
+
+
+def as_judged(
+    effects: Sequence[Effect], readers: Sequence[Reader], outputs: Sequence[Output]
+) -> list[Effect]:
+    """Return effects with the outputs in which they show in these records.
+
+    Effects that show in none of them are left out.
+    """
+    if any(output.in_series for output in outputs):
+        return _in_series(effects, any(output.stage == "linkage" for output in outputs))
+    if readers[0].moved:
+        return _under_motion(effects, readers[0].imposed)
+    return list(effects)
+
+
+def _in_series(effects: Sequence[Effect], separate: bool) -> list[Effect]:
+    """Return effects for loader and linkage in series; the linkage's show in the loader's output.
+
+    `separate` where other records have δc, and judge the linkage alone as well. Effects of the
+    sensor of δc are left out where none has it.
+    """
+
+    def shown(effect: Effect) -> Effect:
+        if "linkage" not in effect.shows_in:
+            return effect
+        others = [name for name in effect.shows_in if name != "linkage" or separate]
+        return replace(effect, outputs=tuple(dict.fromkeys((*others, "loader"))))
+
+    return [shown(effect) for effect in effects if separate or not effect.of_sensor]
+
+
+def _under_motion(library: Sequence[Effect], imposed: str) -> list[Effect]:
+    """Return a library for imposed motions: the linkage's effects show in the force.
+
+    Only play does where δc is `imposed`, and none that is a limit of the servo: the motion of the
+    grip is given, whatever the servo can do.
+    """
+    found = []
+    for effect in library:
+        keys = [p.key for p in effect.parameters]
+        plays = [p for p in effect.parameters if p.key.rpartition("_")[0] == OF_PLAY]
+        if effect.stage != "linkage":
+            sensed = imposed == "deflection" and "linkage" in effect.shows_in
+            found.append(replace(effect, outputs=("loader",)) if sensed else effect)
+        elif plays:
+            if len(keys) == 1:
+                found.append(replace(effect, outputs=("loader",), seen=partial(_plays, plays[0])))
+        elif imposed == "deflection" and not any("servo" in k and "limit" in k for k in keys):
+            found.append(replace(effect, outputs=("loader",)))
+    return found
+
+
+def _plays(
+    number: Parameter, outputs: Sequence[Output], rig: Rig, control: ControlName
+) -> list[dict[str, float]]:
+    """Return the backlashes with the least residual of the force, where a fit starts, by scans.
+
+    The cost has local minima, since the jumps of a backlash move from sample to sample. The force
+    is scanned once as the rig predicts it, and once with a free factor and offset: with an unknown
+    damping the prediction may be far off.
+    """
+    ours = [output for output in outputs if output.stage == "loader"]
+    key = dotted(number.key_on(control), control)
+    filed, travel = rig.controls[control].loader.play, rig.controls[control].travel
+
+    @cache
+    def left(play: float) -> tuple[float, float]:
+        other = rig.changed({key: number.entered(filed, play)})
+        each = [(one.measured / one.floor, one.residual(other, wide=True)) for one in ours]
+        as_filed = sum(float(np.sum(misfit**2)) for _, misfit in each)
+        scaled = sum(_beside_factor(seen, seen - misfit) for seen, misfit in each)
+        return as_filed, scaled
+
+    found = []
+    for i in range(2):
+        rough = np.geomspace(PLAY_LEAST * travel, travel, PLAYS).tolist()
+        best = min(rough, key=lambda play: left(play)[i])
+        fine = (best * np.linspace(0.75, 1.3, PLAYS)).tolist()
+        found.append(min(fine, key=lambda play: left(play)[i]))
+    alike = abs(found[1] - found[0]) < PLAYS_ALIKE * found[0]
+    return [{number.name: play} for play in found[: 1 if alike else 2]]
+
+
+def _beside_factor(seen: Floats, predicted: Floats) -> float:
+    """Return the sum of squares that any positive factor and offset of a prediction leave."""
+    about, moves = seen - seen.mean(), predicted - predicted.mean()
+    power, shared = float(moves @ moves), float(moves @ about)
+    return float(about @ about) - (shared**2 / power if min(power, shared) > 0.0 else 0.0)
+
+
+def _under_set_points(
+    library: Sequence[Effect], records: Collection[Record], control: ControlName
+) -> list[Effect]:
+    """Return a library for set points, with the limit of the servo's rate above what it reached."""
+    grip = channel(control, "deflection")
+    seen = [_reached(record[grip], record) for record in records if grip in record]
+    reached = max(seen, default=0.0)
+
+    def left(parameter: Parameter) -> Parameter:
+        lowest = reached if parameter.key == RATE_LIMIT else 0.0
+        return replace(parameter, low=max(parameter.low, min(lowest, 0.5 * parameter.high)))
+
+    return [
+        replace(effect, parameters=tuple(map(left, effect.parameters)))
+        for effect in library
+        if not effect.of_sensor
+    ]
+
+
+def _reached(grip: Floats, record: Record) -> float:
+    """Return the speed in d/s that the grip surely reached, over a few frames, beyond its noise.
+
+    A play only makes it slower than the servo; a bend would add to it, but has no say here.
+    """
+    rate_Hz = (len(grip) - 1) / float(record.time_s[-1] - record.time_s[0])
+    noise = REACHED_BEYOND * heard(grip).rms
+    over = [n for n in REACHED_OVER if n < len(grip)]
+    way = [float(np.max(np.abs(grip[n:] - grip[:-n]))) - noise for n in over]
+    return max([rate_Hz * w / n for n, w in zip(over, way, strict=True)], default=0.0)

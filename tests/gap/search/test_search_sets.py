@@ -1,0 +1,83 @@
+"""The search over sets of effects: known effects from records, healthy records, priors and ties."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import pytest
+
+from coupled.gap.diagnose import Diagnosis, diagnose
+from coupled.rig.rig import Rig
+from tests.support.gaps import made, nominal_rig
+
+
+def answer(
+    folder: Path, values: Mapping[str, Mapping[str, float]], seed: int, rig: Rig | None = None
+) -> Diagnosis:
+    """Return the diagnosis of a bench's record with effects."""
+    nominal = rig or nominal_rig(False)
+    record = made(folder, nominal, values, seed)
+    return diagnose(nominal, {"r": record})
+
+
+@pytest.mark.parametrize("seed", [11, 12, 13])
+def test_a_healthy_record_has_no_gap(tmp_path: Path, seed: int) -> None:
+    found = answer(tmp_path, {}, seed)
+    assert found.verdict == "no_gap"
+    assert found.effects == ()
+
+
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [
+        ("bend", {"bend_{d}_per_N": 1.8e-4}),
+        pytest.param("coulomb_friction", {"friction_N": 3.0}, marks=pytest.mark.slow),
+        ("inertia", {"factor": 1.3}),
+        ("deflection_zero", {"offset_{d}": 2e-3}),
+        pytest.param("transport_delay", {"delay_s": 0.02}, marks=pytest.mark.slow),
+    ],
+)
+def test_a_known_effect_is_found_at_its_size(
+    tmp_path: Path, name: str, values: dict[str, float]
+) -> None:
+    found = answer(tmp_path, {name: values}, 3)
+    assert [effect.name for effect in found.effects] == [name]
+    assert found.verdict == "effect"
+    (value,) = values.values()
+    number = found.effects[0].parameters[0]
+    assert number.low is not None
+    assert number.high is not None
+    assert number.low <= value <= number.high
+
+
+def test_two_effects_of_two_stages_are_found_together(tmp_path: Path) -> None:
+    both = {"bend": {"bend_{d}_per_N": 1.6e-4}, "inertia": {"factor": 1.4}}
+    found = answer(tmp_path, both, 5)
+    assert {effect.name for effect in found.effects} == set(both)
+
+
+def test_beside_an_effect_without_a_number_another_stage_is_explained_too(tmp_path: Path) -> None:
+    servo = nominal_rig(False).changed({"controls.column.loader.servo_frequency_Hz": 12.0})
+    both = {"no_servo": {}, "inertia": {"factor": 1.4}}
+    found = answer(tmp_path, both, 6, servo)
+    assert {effect.name for effect in found.effects} == set(both)
+
+
+def test_a_number_within_its_tolerance_is_no_effect_and_one_beyond_it_is(tmp_path: Path) -> None:
+    assert answer(tmp_path, {"inertia": {"factor": 1.01}}, 7).verdict == "no_gap"
+    beyond = answer(tmp_path, {"inertia": {"factor": 1.15}}, 7)
+    assert [effect.name for effect in beyond.effects] == ["inertia"]
+
+
+def test_what_no_record_separates_is_ambiguous(tmp_path: Path) -> None:
+    """Where nothing bends, the zero of a gauge and a constant force are one law."""
+    rigid = nominal_rig(False).changed(
+        {
+            "controls.column.loader.bend_m_per_N": 0.0,
+            "controls.column.compensation.bend_m_per_N": 0.0,
+        }
+    )
+    found = answer(tmp_path, {"force_offset": {"offset_N": 4.0}}, 9, rigid)
+    assert found.verdict == "ambiguous"
+    assert {"force_offset", "force_zero"} <= set(found.rivals[0])

@@ -1,0 +1,253 @@
+"""The search over sets of effects on outputs whose answer is known: what it names, and what not."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from coupled.gap.effects.effect import Effect
+from coupled.gap.effects.library import BY_NAME, EFFECTS
+from coupled.gap.search.beam import search_sets
+from coupled.gap.search.case import Case
+from coupled.gap.search.found import Choice
+from coupled.gap.signals.output import Output
+from coupled.gap.stages.stages import Reader
+from coupled.gap.stages.surfaces import surface_points
+from coupled.gap.thresholds import RIVAL_GAIN
+from coupled.rig.rig import Rig
+from tests.support.gaps import made, nominal_rig
+from tests.support.rigs import bench
+
+Floats = NDArray[np.float64]
+FRAMES = 3000
+FIRST, SECOND, UNKNOWN, NOISE, OTHER = np.random.default_rng(8).normal(size=(5, FRAMES))
+OFFSET, WEIGHT = BY_NAME["force_offset"], BY_NAME["bob_weight"]
+DAMPING, LAG = BY_NAME["viscous_damping"], BY_NAME["modifying_lag"]
+
+
+def output(measured: Floats, predict: Callable[[Rig], Floats], stage: str = "loader") -> Output:
+    """Return an output with white noise of 1."""
+    return Output(stage, stage, measured, predict, 1.0, 120.0)
+
+
+def found(outputs: Sequence[Output], library: Sequence[Effect], rig: Rig | None = None) -> Choice:
+    """Return what a search of these outputs finds."""
+    return search_sets(Case(rig or bench(), "column", outputs), library)[1]
+
+
+def names(choice: Choice) -> set[str]:
+    """Return the effects found."""
+    return {step.effect.name for step in choice.steps}
+
+
+def offset_and_weight(apart: float) -> Callable[[Rig], Floats]:
+    """Return a constant force, and a weight that acts alike but for so much of another motion."""
+
+    def predict(rig: Rig) -> Floats:
+        loader = rig.controls["column"].loader
+        return np.asarray(loader.offset * FIRST + loader.bob_weight * (FIRST + apart * SECOND))
+
+    return predict
+
+
+@pytest.mark.parametrize(("apart", "separable"), [(0.3, True), (0.0, False)])
+def test_two_effects_are_separated_where_their_signatures_differ(
+    apart: float, separable: bool
+) -> None:
+    choice = found([output(FIRST + NOISE, offset_and_weight(apart))], [OFFSET, WEIGHT])
+    (step,) = choice.steps
+    assert {step.effect.name, *(rival.effect.name for rival in step.rivals)} == (
+        {"force_offset"} if separable else {"force_offset", "bob_weight"}
+    )
+    assert all(rival.gain > step.gain - RIVAL_GAIN for rival in step.rivals)
+    assert step.probability == pytest.approx(1.0 if separable else 0.5, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("apart", "lag_s", "factor", "named"),
+    [
+        (0.0, 0.005, 1.0, {"viscous_damping", "modifying_lag"}),
+        (0.0, 0.0, 0.5, {"viscous_damping", "modifying_lag"}),
+        (0.5, 0.005, 1.0, {"modifying_lag"}),
+        (0.5, 0.0, 0.5, {"viscous_damping"}),
+    ],
+)
+def test_laws_that_are_one_in_a_limit_are_alternatives(
+    apart: float, lag_s: float, factor: float, named: set[str]
+) -> None:
+    """A lag of F_mod acts as a negative damping, where little else moves."""
+    nominal = bench()
+    filed = nominal.controls["column"].loader.damping
+
+    def predict(rig: Rig) -> Floats:
+        loader = rig.controls["column"].loader
+        late = -100.0 * loader.modifying_lag
+        return np.asarray(
+            10.0 * ((loader.damping / filed - 1.0) * FIRST + late * (FIRST + apart * SECOND))
+        )
+
+    keys = {"modifying_lag_s": lag_s, "damping_N_s_per_m": factor * filed}
+    real = nominal.changed({f"controls.column.loader.{key}": v for key, v in keys.items()})
+    (step,) = found([output(predict(real) + NOISE, predict)], [DAMPING, LAG]).steps
+    assert {step.effect.name, *(rival.effect.name for rival in step.rivals)} == named
+
+
+@pytest.mark.parametrize(
+    ("unknown", "expected"), [(0.0, {"force_offset", "bob_weight"}), (3.0, {"force_offset"})]
+)
+def test_a_second_effect_is_named_where_it_explains_what_the_first_leaves(
+    unknown: float, expected: set[str]
+) -> None:
+    def predict(rig: Rig) -> Floats:
+        loader = rig.controls["column"].loader
+        return np.asarray(loader.offset * FIRST + loader.bob_weight * SECOND)
+
+    second = 3.0 * SECOND * (unknown == 0.0) + unknown * UNKNOWN
+    choice = found([output(30.0 * FIRST + second + NOISE, predict)], [OFFSET, WEIGHT])
+    assert names(choice) == expected
+    offset = choice.fit.values[OFFSET.value_key(OFFSET.free[0])]
+    assert offset == pytest.approx(30.0, rel=0.01)
+
+
+def test_two_slow_effects_are_found_together() -> None:
+    """Alone each leaves the other's slow wave, which is worth few effective samples."""
+    turns = 2.0 * np.pi * np.arange(FRAMES) / FRAMES
+    first, second = np.sin(2.0 * turns), np.sin(3.0 * turns)
+
+    def predict(rig: Rig) -> Floats:
+        loader = rig.controls["column"].loader
+        return np.asarray(loader.offset * first + loader.bob_weight * second)
+
+    measured = 12.0 * first + 12.0 * second + NOISE
+    choice = found([output(measured, predict)], [OFFSET, WEIGHT])
+    assert names(choice) == {"force_offset", "bob_weight"}
+    values = [choice.fit.values[one.value_key(one.free[0])] for one in (OFFSET, WEIGHT)]
+    assert values == pytest.approx([12.0, 12.0], rel=0.02)
+
+
+@pytest.mark.parametrize("first", [FIRST, np.sin(np.arange(FRAMES) / 9.0)])
+def test_an_effect_that_spoils_another_stage_is_not_named(first: Floats) -> None:
+    """The zero of the gauge fits the loader as well, but the linkage refutes it."""
+    zero = BY_NAME["force_zero"]
+
+    def loader(rig: Rig) -> Floats:
+        column = rig.controls["column"]
+        return np.asarray((column.loader.offset + column.sensing.force_zero) * first)
+
+    def linkage(rig: Rig) -> Floats:
+        return np.asarray(0.2 * rig.controls["column"].sensing.force_zero * first)
+
+    outputs = [output(10.0 * first + NOISE, loader), output(OTHER, linkage, "linkage")]
+    choice = found(outputs, [zero, OFFSET])
+    assert names(choice) == {"force_offset"}
+    assert choice.steps[0].rivals == ()
+
+
+@pytest.mark.parametrize(("is_there", "named"), [(True, {"arc_geometry"}), (False, set[str]())])
+def test_a_discrete_effect_is_tried_within_a_stage_s_limit(is_there: bool, named: set[str]) -> None:
+    """A noise floor of twice the noise hides an arc that trebles the residual."""
+
+    def predict(rig: Rig) -> Floats:
+        return np.asarray(1.0 * FIRST * rig.controls["column"].loader.arc_geometry)
+
+    arc = output(1.0 * FIRST * is_there + 0.5 * NOISE, predict, "linkage")
+    assert arc.gap(bench()) < arc.limit
+    assert names(found([arc], [BY_NAME["arc_geometry"]])) == named
+
+
+def test_what_lies_far_below_a_noise_floor_outweighs_no_gap() -> None:
+    """Beside an offset of 16 noise floors, δ̂ goes from 0.005 to 0.064 of its own."""
+
+    def offset(rig: Rig) -> Floats:
+        return np.full(FRAMES, rig.controls["column"].loader.offset)
+
+    def estimate(rig: Rig) -> Floats:
+        return np.full(FRAMES, 0.064 if rig.controls["column"].loader.offset else 0.005)
+
+    slow = output(16.0 + np.repeat(NOISE[::20], 20), offset)
+    choice = found([slow, output(np.zeros(FRAMES), estimate, "compensation")], [OFFSET])
+    assert names(choice) == {"force_offset"}
+
+
+@pytest.mark.parametrize(("frame_rate_Hz", "possible"), [(120.0, False), (240.0, True)])
+def test_a_mode_faster_than_the_frames_show_is_no_effect(
+    frame_rate_Hz: float, possible: bool
+) -> None:
+    mode = BY_NAME["structural_mode"]
+
+    def predict(rig: Rig) -> Floats:
+        loader = rig.controls["column"].loader
+        faster = loader.bend_frequency / 76.0 - 1.0
+        more = faster * SECOND + loader.bend_damping_ratio * UNKNOWN
+        return np.asarray(1e5 * loader.bend * (FIRST + more))
+
+    number = replace(mode.parameters[1], starts=(70.0,))
+    fast = replace(mode, parameters=(mode.parameters[0], number, mode.parameters[2]))
+    numbers = {"bend_m_per_N": 2e-4, "bend_frequency_Hz": 76.0, "bend_damping_ratio": 0.5}
+    real = bench(numbers)
+    linkage = replace(
+        output(predict(real) + NOISE, predict, "linkage"), frame_rate_Hz=frame_rate_Hz
+    )
+    choice = found([linkage], [fast], bench({"bend_m_per_N": 1e-4}))
+    assert names(choice) == ({"structural_mode"} if possible else set())
+
+
+@cache
+def stage_of_record(
+    stage: str, name: str, values: tuple[tuple[str, float], ...], seed: int
+) -> Case:
+    """Return one stage of a bench's record with an effect."""
+    rig = nominal_rig(False)
+    with TemporaryDirectory() as folder:
+        record = made(Path(folder), rig, {name: dict(values)}, seed)
+    outputs = Reader(rig, record, "column", surface_points).outputs()
+    return Case(rig, "column", [one.halved(rig) for one in outputs if one.stage == stage])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [
+        ("bend", {"bend_{d}_per_N": 1e-4}),
+        ("bend_hysteresis", {"bend_{d}_per_N": 1e-4, "share": 0.3, "width_N": 6.0}),
+        ("stiffening_bend", {"bend_{d}_per_N": 1e-4, "limit_{d}": 8e-3}),
+        (
+            "structural_mode",
+            {"bend_{d}_per_N": 1e-4, "frequency_Hz": 6.0, "damping_ratio": 0.05},
+        ),
+        ("servo_delay", {"delay_s": 0.03, "factor": 1.0}),
+        ("servo_tuning", {"delay_s": 0.02, "factor": 1.22, "damping_factor": 0.8}),
+    ],
+)
+def test_of_laws_that_contain_one_another_the_one_that_is_there_is_named(
+    name: str, values: dict[str, float]
+) -> None:
+    case = stage_of_record("linkage", name, tuple(values.items()), 31)
+    library = [effect for effect in EFFECTS if effect.stage == "linkage"]
+    assert names(search_sets(case, library)[1]) == {name}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [35, 38, 42, 43])
+def test_a_breakaway_is_found_among_the_local_minima_of_dry_friction(seed: int) -> None:
+    """The law's own starts end where the control sticks in another order than in the record."""
+    law = BY_NAME["stribeck_friction"]
+    true = {"friction_N": 2.0, "breakaway_N": 6.0, "stribeck_{d}_per_s": 2e-3}
+    case = stage_of_record("loader", law.name, tuple(true.items()), seed)
+    choice = search_sets(case, [effect for effect in EFFECTS if effect.dry])[1]
+    assert names(choice) == {law.name}
+    assert choice.fit.values[f"{law.name}.breakaway_N"] == pytest.approx(6.0, rel=0.03)
+
+
+@pytest.mark.slow
+def test_plain_friction_is_plain_friction() -> None:
+    case = stage_of_record("loader", "coulomb_friction", (("friction_N", 3.0),), 31)
+    choice = search_sets(case, [effect for effect in EFFECTS if effect.dry])[1]
+    assert names(choice) == {"coulomb_friction"}
