@@ -71,7 +71,7 @@ def test_a_first_rig_flies(tmp_path: Path) -> None:
 
 
 def test_every_guess_of_a_first_rig_is_listed_as_one(tmp_path: Path) -> None:
-    found = survey(chosen_model("J3Cub"))
+    found = survey(chosen_model("J3Cub"), speeds=True)
     text = draft(found, "cub")
     assert kind_of(found.mass_kg).name in text
     file = tmp_path / "cub.toml"
