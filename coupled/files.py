@@ -327,3 +327,11 @@ def _is_stale(path: Path) -> bool:
     except OSError:
         return False
     return False
+
+
+def path_from(folder: Path, path: Path) -> str:
+    """Return a path relative to a folder, with slashes; the whole path from another drive."""
+    try:
+        return Path(os.path.relpath(path, folder.resolve())).as_posix()
+    except ValueError:  # of Windows
+        return path.resolve().as_posix()

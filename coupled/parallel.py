@@ -29,6 +29,7 @@ from typing import Any, TypeVar
 from coupled.errors import InputError, say_warning
 
 MOST_WORKERS = 512  # processes: more than any machine has cores for
+_MOST_ON_WINDOWS = 61  # it waits for no more processes at once
 PATIENCE_s = 10.0
 _ATTENTIVE_s = 0.2  # a wait without end may not see an interruption before a job is done
 T = TypeVar("T")
@@ -235,7 +236,8 @@ def cores(workers: int) -> int:
         raise InputError(
             "workers", "", f"is {workers}; give 1 to {MOST_WORKERS}, or 0 for all cores"
         )
-    return workers or os.cpu_count() or 1
+    wanted = workers or os.cpu_count() or 1
+    return min(wanted, _MOST_ON_WINDOWS) if sys.platform == "win32" else wanted
 
 
 def guarded() -> bool:

@@ -77,6 +77,11 @@ def quantity(unit: str, default: Any = ..., *, written: bool = False, **bounds: 
     return Field(default, json_schema_extra={"unit": unit, "written": written}, **bounds)
 
 
+def derived(default: Any) -> Any:
+    """Declare a field that no file has: another section's values give it."""
+    return Field(default, json_schema_extra={"derived": True})
+
+
 def named(key: str, default: Any = ..., **bounds: Any) -> Any:
     """Declare a field whose key in a file is a word that Python, or pydantic, keeps for itself."""
     return Field(default, json_schema_extra={"key": key}, **bounds)
@@ -106,6 +111,8 @@ def _file_keys(section: type[Section], d: str) -> dict[str, str]:
         extra = info.json_schema_extra
         marks = extra if isinstance(extra, dict) else {}
         unit = str(marks.get("unit", "")).format(d=d)
+        if marks.get("derived"):
+            continue
         key = str(marks.get("key", name))
         keys[f"{key}_{unit}" if unit else key] = name
     return keys

@@ -247,6 +247,7 @@ def test_a_missing_pandas_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
         fly(column=PULL).to_pandas()
 
 
+@pytest.mark.slow
 def test_a_record_is_diagnosed_from_a_file_as_from_memory(tmp_path: Path) -> None:
     rig = coupled.load_rig("t37")
     worn = rig.changed({"controls.column.loader.bend_m_per_N": 4e-4})

@@ -12,7 +12,7 @@ from coupled.rig.rig import Rig, of_file
 from coupled.rig.rigfile import read_rig, rig_from_table
 from coupled.schema import loads_toml
 from coupled.surveying.draft import draft
-from coupled.surveying.survey import model_given, surveyed
+from coupled.surveying.survey import chosen_model, surveyed
 from coupled.surveying.terms import ModelTerms, list_terms
 from coupled.surveying.whole import Survey, survey_models
 
@@ -48,8 +48,8 @@ def models(
 ) -> Survey:
     """Return where JSBSim's models trim or why not, how their controls move, and their rigs.
 
-    `names` are some of the models that are here; all without. `workers` are processes, 0 for one a
-    core. Raises InputError for a model that is not here.
+    `names` are some of the models that are here, or folders of others; all that are here without.
+    `workers` are processes, 0 for one a core. Raises InputError for a model that is not there.
 
     >>> import coupled
     >>> found = coupled.models(["T37"])
@@ -84,7 +84,7 @@ def terms(
 def new_rig(model: str | PathLike[str], name: str = "", *, airframe_only: bool = False) -> Rig:
     """Return a first rig for a JSBSim model: where it trims, found; its loader, guessed.
 
-    `model` is one that is here, or the folder of another (NAME/NAME.xml). `name` is the rig's, by
+    `model` is one that is here, or the folder of another, or its file. `name` is the rig's, by
     default the model's. `airframe_only`: it has no control. The file that `save` writes marks each
     guess. Raises InputError for a model that is not here, does not trim, or has no control that a
     rig can move.
@@ -97,9 +97,9 @@ def new_rig(model: str | PathLike[str], name: str = "", *, airframe_only: bool =
     True
     """
     word = fspath(model)
-    own, home, known = model_given(word)
-    found = surveyed(word, own, home, airframe_only)
-    title = name or found.model
-    text = draft(found, title, "" if known else str(home), airframe_only)
+    chosen = chosen_model(word)
+    found = surveyed(word, chosen, airframe_only)
+    title = name or chosen.file or chosen.model
+    text = draft(found, title, str(chosen.home) if chosen.own else "", airframe_only)
     file = Path(f"{title}.toml")
     return of_file(rig_from_table(loads_toml(text, file), file), (file, text))

@@ -20,6 +20,7 @@ from coupled.rig.packing import COMMAND_SIGN
 from coupled.rig.parameters import Loader
 from coupled.rig.rig import Rig
 from coupled.rig.statics import static_point
+from coupled.rig.surface import share_of_travel
 
 Floats = NDArray[np.float64]
 _AT_STOP_rad = 1e-6  # from its stop, within which a surface is at it
@@ -104,7 +105,7 @@ def predict_at_rest(
     preload = math.copysign(loader.breakout, deflection)
     felt = float(point.force[0]) - preload - loader.bob_weight * (load - 1.0)
     specified = float(point.specified[0]) - preload
-    commanded = _limit_to_stop(np.array([_gain(rig, control) * deflection]), stop)
+    commanded = _limit_to_stop(_commands(rig, control, np.array([deflection])), stop)
     loss = 1.0 - float(_limit_to_stop(point.command, stop)[0] / commanded[0])
     return loss, felt / specified if specified else float("nan")
 
@@ -140,10 +141,10 @@ def find_held_rows(time_s: Floats, deflection: Floats) -> NDArray[np.bool_]:
     return np.asarray(held if held.sum() >= reach else share >= 0.98)
 
 
-def _gain(rig: Rig, control: ControlName) -> float:
-    """Return the surface command, in ±1, for a deflection of 1 d."""
+def _commands(rig: Rig, control: ControlName, deflection: Floats) -> Floats:
+    """Return the surface commands for deflections in d, 1 for full travel, without a limit."""
     data = rig.controls[control]
-    return COMMAND_SIGN[data.surface] / data.travel
+    return COMMAND_SIGN[data.surface] * share_of_travel(data, deflection)
 
 
 def _limit_to_stop(commands: Floats, stop: float | None) -> Floats:
@@ -157,7 +158,7 @@ def average_commands(
     rig: Rig, control: ControlName, record: Record, held: NDArray[np.bool_]
 ) -> Commands:
     """Return the mean surface commands for the deflection, and reached, in ±1."""
-    commanded = _gain(rig, control) * true_deflection(rig, control, record)[held]
+    commanded = _commands(rig, control, true_deflection(rig, control, record)[held])
     reached = record[channel(control, "surface_norm")]
     stop = _surface_stop(rig, control, record, held, float(np.mean(commanded)))
     if stop is None or abs(float(np.mean(commanded))) <= abs(stop):

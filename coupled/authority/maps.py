@@ -93,7 +93,7 @@ def loss_maps(rig: Rig, control: ControlName) -> list[LossMap]:
     data = rig.controls[control]
     most = max(data.schedule.dynamic_pressure)
     pressures = np.linspace(0.0, most if most > 0.0 else _CONSTANT_Pa, _PRESSURES)
-    deflections = data.travel * np.linspace(0.002, 1.0, _DEFLECTIONS)
+    deflections = data.pull * np.linspace(0.002, 1.0, _DEFLECTIONS)
     made = []
     for name in CONFIGURATIONS[1:]:
         changed = configure(rig, name)
@@ -108,11 +108,11 @@ def _pulled(rig: Rig, control: ControlName, pressure_Pa: float) -> tuple[Floats,
     If the loader reaches its stop before the grip's travel, the structure bends on from there.
     """
     data = rig.controls[control]
-    stop = stop_of(data.travel, data.loader.stop_aft)
+    stop = stop_of(data.pull, data.loader.stop_aft)
     line = static_line(rig, control, pressure_Pa, stop * np.linspace(1e-6, 1.0, _STEPS))
     parts = [line]
-    if line.deflection[-1] < data.travel:
-        full = data.travel * (1.0 + 1e-9)  # margin for rounding
+    if line.deflection[-1] < data.pull:
+        full = data.pull * (1.0 + 1e-9)  # margin for rounding
         beyond = np.linspace(line.deflection[-1], full, _BEYOND_STOP)[1:]
         points = [static_point(rig, control, pressure_Pa, float(each)) for each in beyond]
         # The grip of a rigid structure stops there.
@@ -193,9 +193,9 @@ def _forces(rig: Rig, pressure: Floats, commands: Floats) -> Floats:
     out = []
     for q, command in zip(pressure.tolist(), commands.tolist(), strict=True):
         _, estimate, forces = _pulled(rig, "column", q)
-        wanted = min(abs(command) * control.travel, estimate[-1])
+        wanted = min(abs(command) * control.pull, estimate[-1])
         force = np.interp(wanted, estimate, forces, left=np.nan)
-        past = (force - control.loader.breakout + control.loader.offset) * command * control.travel
+        past = (force - control.loader.breakout + control.loader.offset) * command * control.pull
         out.append(past / wanted if wanted > 0.0 else 0.0)
     return np.array(out)
 

@@ -6,8 +6,9 @@ the set A with its i-th column from B. For a figure f with variance V over them,
     first_i = ⟨f_B·(f_ABi − f_A)⟩/V        share of V by i alone (Saltelli et al. 2010)
     total_i = ⟨(f_A − f_ABi)²⟩/(2·V)       with all interactions of i (Jansen 1999)
 
-The intervals are those of 95 % over resampled points. A point is left out if one of its flights
-could not be flown, or ended before the figure was available.
+`scipy.stats.sobol_indices` gives the same numbers, but refuses any number of points that is no
+power of two. The intervals are those of 95 % over resampled points. A point is left out if one of
+its flights could not be flown, or ended before the figure was available.
 """
 
 from __future__ import annotations

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -17,6 +16,7 @@ from coupled.cli.rigs import ControlOption
 from coupled.cli.terminal import check_json, give_json, out, say
 from coupled.display import System, in_system
 from coupled.errors import InputError, shown
+from coupled.files import path_from
 from coupled.record.channels import TIME, ControlName, control_named
 
 if TYPE_CHECKING:
@@ -26,10 +26,14 @@ if TYPE_CHECKING:
     from coupled.surveying.survey import Surveyed
 
 
-@app.command(epilog="[dim]Examples: coupled models · coupled models T37 DHC6 --json -[/]")
+@app.command(
+    epilog="[dim]Examples: coupled models · coupled models T37 DHC6 --json -"
+    " · coupled models ~/fgdata/Aircraft[/]"
+)
 def models(
     names: Annotated[
-        list[str] | None, typer.Argument(help="Models to look at. (default: all that are here)")
+        list[str] | None,
+        typer.Argument(help="Models, their files, or folders of models. (default: all known)"),
     ] = None,
     workers: Annotated[
         int,
@@ -43,7 +47,7 @@ def models(
     from coupled.surveying.survey import chosen_models
     from coupled.surveying.whole import survey_models
 
-    chosen_models(names or (), "coupled models")
+    chosen_models(names or ())
     check_json(json_file, [])
     with progress() as advance:
         found = survey_models(names or (), workers, advance)
@@ -55,7 +59,8 @@ def models(
 @app.command(epilog="[dim]Examples: coupled terms c172p · coupled terms T37 --run pull-up-t37[/]")
 def terms(
     model: Annotated[
-        str, typer.Argument(help="A JSBSim model that is here, or the folder of another.")
+        str,
+        typer.Argument(help="A JSBSim model that is here, or the folder or file of another."),
     ],
     run: Annotated[
         str,
@@ -108,7 +113,8 @@ def _print(rows: Sequence[Surveyed]) -> None:
 )
 def rig(
     model: Annotated[
-        str | None, typer.Argument(help="A JSBSim model that is here, or the folder of another.")
+        str | None,
+        typer.Argument(help="A JSBSim model that is here, or the folder or file of another."),
     ] = None,
     file: Annotated[
         Path | None, typer.Argument(help="The new rig file. (default: MODEL.toml)")
@@ -252,15 +258,15 @@ def _print_found(found: LogNumbers, control: ControlName, units: System) -> None
 def _for_model(model: str, file: Path | None, airframe_only: bool) -> None:
     """Write a first rig for a JSBSim model: where it trims, found; its loader, guessed."""
     from coupled.surveying.draft import draft
-    from coupled.surveying.survey import model_given, surveyed
+    from coupled.surveying.survey import chosen_model, surveyed
 
-    name, home, known = model_given(model)
-    path = file or Path(f"{name}.toml")
+    chosen = chosen_model(model)
+    path = file or Path(f"{chosen.file or chosen.model}.toml")
     check_new(path, ".toml")
     with progress() as advance:
-        advance(f"where {name} trims", 0, 1)
-        found = surveyed(model, name, home, airframe_only)
-    folder = "" if known else os.path.relpath(home, path.resolve().parent)
+        advance(f"where {chosen.label} trims", 0, 1)
+        found = surveyed(model, chosen, airframe_only)
+    folder = path_from(path.parent, chosen.home) if chosen.own else ""
     text = draft(found, path.stem, folder, airframe_only)
     then = f"coupled new run --rig {path}, and coupled compare"
     then = f"coupled terms {model}" if airframe_only else then

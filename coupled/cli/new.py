@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Annotated
 
@@ -14,7 +13,7 @@ from coupled.cli.rigs import ControlOption, rig_and_control
 from coupled.cli.terminal import say
 from coupled.display import in_system
 from coupled.errors import InputError, nearest, shown
-from coupled.files import check_target, read_text, write_text
+from coupled.files import check_target, path_from, read_text, write_text
 from coupled.outputs import Outputs
 from coupled.record.channels import CONTROL_NAMES
 from coupled.resources import shipped_rigs, starter
@@ -141,7 +140,7 @@ def _run_for(rig: str, control: str, file: Path) -> str:
 
     rig_file, data, name = rig_and_control(rig, control)
     shipped = shipped_rigs().get(rig) == rig_file
-    word = rig if shipped else Path(os.path.relpath(rig_file, file.resolve().parent)).as_posix()
+    word = rig if shipped else path_from(file.parent, rig_file)
     with progress() as advance:
         return first_run(data, name, word, file.stem, advance)
 

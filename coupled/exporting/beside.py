@@ -14,6 +14,7 @@ from coupled.flight.manoeuvre import Manoeuvre
 from coupled.record.channels import (
     LATERAL,
     LONGITUDINAL,
+    SURFACES,
     ControlName,
     channel,
     motion_channels,
@@ -86,7 +87,12 @@ def _motion(manoeuvre: Manoeuvre) -> dict[str, tuple[str, float]]:
     known = [*zip(LONGITUDINAL_PROPERTIES, LONGITUDINAL, strict=True)]
     if len(motion_channels(list(rig.controls), flown=True)) > len(LONGITUDINAL):
         known += zip(LATERAL_PROPERTIES, LATERAL, strict=True)
-    return {prop: (name, scales.get(name, 1.0)) for prop, name in known}
+    own = {
+        f"{SURFACES[name]}_rad": control.properties.position[0]
+        for name, control in rig.controls.items()
+        if control.properties.position
+    }
+    return {own.get(name, prop): (name, scales.get(name, 1.0)) for prop, name in known}
 
 
 def alone_record(manoeuvre: Manoeuvre, record: Record, table: Floats) -> Record:

@@ -101,7 +101,8 @@ def _differs(rig: Rig, other: Rig) -> str:
             if rig.flight is other.flight and not differs
             else (differs or ["another aircraft"])[0]
         )
-    for key in ("model", "steps_per_frame", "terms", *(a.part.name for a in ALTERATIONS)):
+    loaded = ("model", "model_file", "steps_per_frame", "terms")
+    for key in (*loaded, *(a.part.name for a in ALTERATIONS)):
         if getattr(rig.flight, key) != getattr(other.flight, key):
             differs.append(f"flight.{key} = {getattr(other.flight, key)}")
     return differs[0] if differs else ""

@@ -31,7 +31,12 @@ from coupled.schema import Section, file_keys
 # Listed explicitly, not taken from the sections, so that new keys are not included.
 EXPORTED: Mapping[type[Section], frozenset[str]] = {
     Rig: frozenset(("name", "frame_rate", "controls")),
-    Control: frozenset((*("surface", "travel", "length"),)),
+    Control: frozenset(
+        (
+            *("surface", "travel", "travel_pull", "travel_push", "length"),
+            *("command_property", "surface_property"),
+        )
+    ),
     Loader: frozenset(
         (
             *("mass", "damping", "basic_gradient", "breakout", "friction", "breakaway"),
@@ -75,9 +80,9 @@ EXPORTED: Mapping[type[Section], frozenset[str]] = {
     ),
     Flight: frozenset(
         (
-            *("model", "folder", "altitude", "calibrated_airspeed", "flight_path", "trim"),
-            *("properties", "direct_controls", "steps_per_frame", "cg_aft", "fuel", "terms"),
-            *(alteration.part.name for alteration in ALTERATIONS),
+            *("model", "folder", "model_file", "altitude", "calibrated_airspeed", "flight_path"),
+            *("trim", "properties", "direct_controls", "steps_per_frame", "cg_aft", "fuel"),
+            *("terms", *(alteration.part.name for alteration in ALTERATIONS)),
         )
     ),
 }
@@ -142,9 +147,20 @@ APPROXIMATED: Mapping[str, str] = {
 def check_keys(rig: Rig, file: object) -> list[str]:
     """Return the keys left out, with the reason; raises InputError for a key not exported."""
     left = list[str]()
+    for name, control in rig.controls.items():
+        for key in ("command_property", "surface_property"):
+            _check_property(getattr(control, key), file, f"controls.{name}.{key}")
     for section, path, d in _sections(rig):
         left += _check_section(section, path, d, file)
     return left
+
+
+def _check_property(given: str | list[str], file: object, key: str) -> None:
+    """Refuse what is not one property of JSBSim's sign, in rad where it is a position."""
+    names = [given] if isinstance(given, str) else given
+    if len(names) > 1 or any(name.startswith("-") or name.endswith("deg") for name in names):
+        problem = "several properties, or one with - or in deg, are not exported; name one"
+        raise InputError(file, key, problem)
 
 
 def _sections(rig: Rig) -> Iterator[tuple[Section, str, str]]:
@@ -153,7 +169,7 @@ def _sections(rig: Rig) -> Iterator[tuple[Section, str, str]]:
     while waiting:
         section, path, d = waiting.pop()
         yield section, path, d
-        for name in type(section).model_fields:
+        for name in file_keys(type(section), d).values():
             value = getattr(section, name)
             at = f"{path}.{name}" if path else name
             inner = value.items() if isinstance(value, dict) else [("", value)]

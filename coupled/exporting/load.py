@@ -67,7 +67,8 @@ def check_load(folder: Path, rig: Rig, file: object) -> None:
     if flight is None or (flight.cg_aft == 0.0 and flight.fuel == 1.0):
         return
     plain = {"cg_aft": 0.0, "fuel": 1.0, "terms": {}, **{a.part.name: 1.0 for a in ALTERATIONS}}
-    exported = flight.model_copy(update={**plain, "folder": str(folder / "aircraft")})
+    own = {"folder": str(folder / "aircraft"), "model_file": ""}
+    exported = flight.model_copy(update={**plain, **own})
     frame_s, controls = 1.0 / rig.frame_rate, list(rig.controls)
     ours, alone = (
         make_aircraft(each, frame_s, controls, [aircraft_folder()], file)

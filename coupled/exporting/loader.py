@@ -99,8 +99,11 @@ def add_loader(made: Made, place: str, before: Expr, after: Expr, was: Motion) -
     reached = x + h * halfway
     if neutral is not None:
         reached = either(equal(halfway, neutral), 0.0, reached)
-    travel = made.control.travel
-    aft, forward = stop_of(travel, loader.stop_aft), stop_of(travel, loader.stop_forward)
+    control = made.control
+    aft, forward = (
+        stop_of(control.pull, loader.stop_aft),
+        stop_of(control.push, loader.stop_forward),
+    )
     out = f"{place}/computed"
     computed = system.add(out, within(reached, -forward, aft))
     rate = _rate(made, v, halfway)

@@ -54,7 +54,8 @@ class Made:
     @property
     def command(self) -> str:
         """JSBSim's property that moves the surface."""
-        return f"fcs/{SURFACES[self.name]}-cmd-norm"
+        given = self.control.properties.command
+        return given[0] if given else f"fcs/{SURFACES[self.name]}-cmd-norm"
 
     @property
     def sign(self) -> float:

@@ -60,7 +60,7 @@ def model_files(flight: Flight | None, systems: Sequence[str], file: object) -> 
     home = _home(flight, file)
     parts = [each.part for each in alterations(flight)]
     try:
-        with loadable(home, name, parts) as made:
+        with loadable(home / flight.main_file, parts) as made:
             main = read_bytes(made / name / f"{name}.xml")
     except NothingToScaleError as error:
         raise InputError(file, f"flight.{error.name}", f"{name} has {error.lacking}") from None

@@ -41,7 +41,7 @@ def readme_text(
         f" that includes each `Systems/coupled-….xml`{_changed(rig)}, and the loaders of the rig's"
         f" {', '.join(systems)}.",
         _flying(rig, name, rate_Hz, substeps, scripts),
-        _HAND.format(control=next(iter(systems)), command=_command(systems)),
+        _HAND.format(control=next(iter(systems)), command=_command(rig)),
         _properties(systems),
     ]
     if flights:
@@ -72,8 +72,9 @@ def _changed(rig: Rig) -> str:
     return f", for {', '.join(changes)}" if changes else ""
 
 
-def _command(systems: Mapping[str, System]) -> str:
-    return f"fcs/{SURFACES[next(iter(systems))]}-cmd-norm"
+def _command(rig: Rig) -> str:
+    name, control = next(iter(rig.controls.items()))
+    return next(iter(control.properties.command), f"fcs/{SURFACES[name]}-cmd-norm")
 
 
 def _flying(rig: Rig, name: str, rate_Hz: float, substeps: int, scripts: Sequence[str]) -> str:

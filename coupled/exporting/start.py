@@ -18,7 +18,7 @@ from coupled.flight.loop import make_airframe
 from coupled.flight.manoeuvre import Manoeuvre
 from coupled.flight.modelparts import Scaled
 from coupled.record.channels import ALPHA
-from coupled.rig.parameters import Flight
+from coupled.rig.parameters import Flight, SurfaceProperties
 from coupled.units import KNOT_m_per_s
 
 _LEVERS = re.compile(r"fcs/(mixture|advance)-cmd-norm(\[\d+\])?").fullmatch
@@ -73,7 +73,7 @@ def add_start(
     script.before |= flight.properties
     _add_factors(script, flight, names)
     if flight.trim == "newton":
-        _add_newton(script, airframe, names, files)
+        _add_newton(script, airframe, flight, names, files)
         return float(airframe.motion()[ALPHA])
     return None
 
@@ -87,10 +87,14 @@ def _add_factors(script: Script, flight: Flight, names: Sequence[str]) -> None:
             script.started |= part.settings(factor)
 
 
-def _add_newton(script: Script, airframe: JSBSimAirframe, names: list[str], files: Files) -> None:
+def _add_newton(
+    script: Script, airframe: JSBSimAirframe, flight: Flight, names: list[str], files: Files
+) -> None:
     """Set an aircraft that JSBSim cannot trim to the state of Newton's method, before the start."""
     script.trims = False
-    levers = [*filter(_THROTTLES, names), "fcs/elevator-cmd-norm", *_moved_slowly(files)]
+    column = flight.surfaces.get("column", SurfaceProperties())
+    commands = column.command or ["fcs/elevator-cmd-norm"]
+    levers = [*filter(_THROTTLES, names), *commands, *_moved_slowly(files)]
     script.before |= {name: airframe.lever(name).read() for name in levers}
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from coupled.exporting.expression import either, prop, within
+from coupled.exporting.expression import Expr, either, prop, within
 from coupled.exporting.host import pressure
 from coupled.exporting.making import Made, stepping
 
@@ -14,7 +14,7 @@ def add_surface(made: Made) -> None:
     system.channel(
         "surface", "the command about trim, ±1 the whole travel, and its sum with the trim"
     )
-    asked = within((made.sign / control.travel) * own(f"estimate-{made.d}"), -1.0, 1.0)
+    asked = _share(made)
     if rigging.stretch_loss > 0.0:
         asked = asked / (1.0 + rigging.stretch_loss * pressure(made))
     if rigging.lag > 0.0:
@@ -34,3 +34,12 @@ def add_surface(made: Made) -> None:
     )
     given = either(stepping(), own("trim-norm") + own("surface-norm"), prop(made.command))
     system.add("command-norm", given, output=made.command, out="the command given to JSBSim, ±1")
+
+
+def _share(made: Made) -> Expr:
+    """Return δ̂ over the travel on its side, within ±1, by the sign of the surface's command."""
+    control, estimate = made.control, made.own(f"estimate-{made.d}")
+    if control.pull == control.push:
+        return within((made.sign / control.pull) * estimate, -1.0, 1.0)
+    pulled, pushed = within(estimate, 0.0, control.pull), within(estimate, -control.push, 0.0)
+    return (made.sign / control.pull) * pulled + (made.sign / control.push) * pushed

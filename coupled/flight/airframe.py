@@ -24,34 +24,39 @@ import jsbsim
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.errors import InputError, nearest
+from coupled.errors import LISTED, InputError, listed, nearest
 from coupled.flight.everyframe import (
     LATERAL_PROPERTIES,
     LONGITUDINAL_PROPERTIES,
+    PROPERTIES,
     Lever,
     PlainAircraft,
     PlainFrames,
     PlainSteps,
     Read,
+    command_writes,
+    mean_reader,
     motion_reader,
     plain_frames,
     plain_steps,
     stepper,
 )
 from coupled.flight.gusts import GUST_DOWN
-from coupled.flight.modelfile import catalogue, loadable, models_in
+from coupled.flight.modelfile import catalogue, loadable, models_in, properties_read
 from coupled.flight.modelparts import NothingToScaleError
 from coupled.flight.modeltext import UnreadableModelError
-from coupled.flight.newton import newton_trim
+from coupled.flight.newton import Elevators, newton_trim, why_unbalanced
 from coupled.flight.putback import put_back
 from coupled.flight.surfacemap import flown_through, stops_found
 from coupled.flight.wrapper import Step, Wrapper, led_by
 from coupled.record.channels import ALTITUDE, LONGITUDINAL, SURFACES, motion_channels
 from coupled.rig.parameters import Flight
 from coupled.rig.placed import HalfFrames, Placed
-from coupled.units import FOOT_m, KNOT_m_per_s
+from coupled.units import DEGREE_rad, FOOT_m, KNOT_m_per_s
 
 _COMMANDS = {name: f"fcs/{name}-cmd-norm" for name in SURFACES.values()}
+_POSITIONS = {PROPERTIES[f"{surface}_rad"]: control for control, surface in SURFACES.items()}
+UNTRIMMED = "calibrated_airspeed_m_per_s"  # key of the fault of an aircraft that does not trim
 _HEIGHT, _WHEELS = "position/h-agl-ft", "gear/wow"
 _STRUCTURE = re.compile(r"contact/unit(\[\d+\])?/WOW").fullmatch  # contacts other than wheels
 
@@ -120,15 +125,14 @@ class JSBSimAirframe:
         self._fdm = self._load(models, frame_s, wrappers)
         self._trim(wrappers)
         lateral = len(motion_channels(controls, flown=True)) > len(LONGITUDINAL)
-        along = self._reads(LONGITUDINAL_PROPERTIES)
-        beside = self._reads(LATERAL_PROPERTIES if lateral else ())
+        along = [self._motion_read(name) for name in LONGITUDINAL_PROPERTIES]
+        beside = [self._motion_read(name) for name in LATERAL_PROPERTIES if lateral]
         self.motion, self.whole_motion = motion_reader(along, beside)
         self._height = self._node(_HEIGHT).get_double_value
         touching = filter(_STRUCTURE, self._catalog) if flight.landing else [_WHEELS]
         self._touching = self._reads(touching)
         self._extra = self._reads(record, "record_properties", record_file)
-        nodes = [self._node(_COMMANDS[SURFACES[control]]) for control in controls]
-        writes = [(node.set_double_value, node.get_double_value()) for node in nodes]
+        writes = command_writes([self._levers_of(control) for control in controls])
         plain = stepper(self._fdm.run, writes, flight.steps_per_frame)
         hooks = [hook for wrapper in wrappers if (hook := wrapper.attach(self)) is not None]
         self.step = led_by(hooks, plain)
@@ -146,24 +150,27 @@ class JSBSimAirframe:
         """Return the fault of a key of the rig's `flight` section."""
         return InputError(self._file, f"flight.{key}" if key else "flight", problem)
 
-    def _load(self, models: Sequence[Path], frame_s: float, wrappers: Sequence[Wrapper]) -> Any:
+    def _load(
+        self,
+        models: Sequence[Path],
+        frame_s: float,
+        wrappers: Sequence[Wrapper],
+        created: frozenset[str] = frozenset(),
+    ) -> Any:
         _base().debug_lvl = 0
         jsbsim.set_logger(_log)
-        name, known = self._flight.model, dict(packaged_models())
-        for folder in reversed(models):
-            known |= models_in(folder)
-        if self._flight.folder:
-            known[name] = self._own_folder(name)
-        if name not in known:
-            raise self.fault("model", f"there is no JSBSim model {name!r}; {nearest(name, known)}")
+        name, main = self._flight.model, self._main_file(models)
         fdm = jsbsim.FGFDMExec(jsbsim.get_default_root_dir())
-        frame_s /= self._flight.steps_per_frame
-        fdm.set_dt(frame_s)  # before loading, for the model's rate limits
+        step_s = frame_s / self._flight.steps_per_frame
+        fdm.set_dt(step_s)  # before loading, for the model's rate limits
+        self._properties = fdm.get_property_manager()
+        for each in created:
+            self._properties.get_node(each, True)
         _log.text = ""
         scaled = [part for wrapper in wrappers for part in wrapper.scaled]
         ballasts = sum(wrapper.ballasts for wrapper in wrappers)
         try:
-            with loadable(known[name], name, scaled, ballasts) as folder:
+            with loadable(main, scaled, ballasts) as folder:
                 fdm.set_aircraft_path(str(folder))
                 loaded = fdm.load_model(name)
         except NothingToScaleError as error:
@@ -186,21 +193,52 @@ class JSBSimAirframe:
         while fdm.get_output_filename(output):
             fdm.set_output_filename(output, os.devnull)
             output += 1
-        fdm.set_dt(frame_s)
-        self._properties = fdm.get_property_manager()
+        fdm.set_dt(step_s)
         # The manager crashes on a malformed name, so names are searched in this list.
         self._catalog = catalogue(fdm.query_property_catalog(""))
+        self._catalog = {**self._catalog, **dict.fromkeys(created, "RW")}
+        self._main = main
+        lacking = self._flight.properties.keys() - self._catalog.keys()
+        if lacking and (wanted := lacking & properties_read(main)):
+            # Another program creates them, as FlightGear does: before loading, as that does.
+            return self._load(models, frame_s, wrappers, created | wanted)
         return fdm
 
-    def _own_folder(self, name: str) -> Path:
+    def _main_file(self, models: Sequence[Path]) -> Path:
+        """Return the model's main file."""
+        name, known = self._flight.model, dict(packaged_models())
+        for folder in reversed(models):
+            known |= models_in(folder)
+        if self._flight.folder:
+            known[name] = self._own_folder()
+        if name not in known:
+            raise self.fault("model", f"there is no JSBSim model {name!r}; {nearest(name, known)}")
+        main = known[name] / self._flight.main_file
+        if not main.is_file():
+            raise self.fault("model_file", f"there is no {self._flight.main_file} of JSBSim")
+        return main
+
+    def _unmade(self) -> InputError | None:
+        """Return the fault of a model that reads properties which nothing creates, if it does."""
+        names = sorted(properties_read(self._main) - self._catalog.keys())
+        if not names:
+            return None
+        more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
+        problem = (
+            f"{self._flight.model} reads properties that JSBSim does not create, as FlightGear"
+            f" does: {listed(names[:LISTED])}{more}; give each a value here"
+        )
+        return self.fault("properties", problem)
+
+    def _own_folder(self) -> Path:
         """Return the folder of the rig's own model."""
         folder = Path(self._flight.folder)
         try:
-            there = (folder / name / f"{name}.xml").is_file()
+            there = (folder / self._flight.main_file).is_file()
         except (OSError, ValueError):  # a name that no folder can have
             there = False
         if not there:
-            raise self.fault("model_folder", f"holds no {name}/{name}.xml")
+            raise self.fault("model_folder", f"holds no {self._flight.main_file}")
         return folder
 
     def _set(self, name: str, value: float) -> None:
@@ -224,6 +262,38 @@ class JSBSimAirframe:
             raise InputError(file, key, f"{problem}{like}; none is created")
         return node
 
+    def _motion_read(self, name: str) -> Read:
+        """Return the function that reads a property of the motion, or what a rig has for it."""
+        control = _POSITIONS.get(name, "")
+        given = self._flight.surfaces.get(control)
+        if given is None or not given.position:
+            return cast(Read, self._node(name).get_double_value)
+        key = f"controls.{control}.surface_property"
+        terms: list[tuple[float, Read]] = []
+        for each in given.position:
+            if each.endswith("norm"):
+                problem = f"{each} is no angle; name a property in rad or deg"
+                raise InputError(self._file, key, problem)
+            factor = DEGREE_rad if each.endswith("deg") else 1.0
+            factor *= (-1.0 if each.startswith("-") else 1.0) / len(given.position)
+            node = self._node(each.removeprefix("-"), key, self._file)
+            terms.append((factor, node.get_double_value))
+        return mean_reader(terms)
+
+    def _levers_of(self, control: str) -> list[tuple[str, float, Lever]]:
+        """Return the properties that a control commands: name, sign, and how to set it."""
+        given = self._flight.surfaces.get(control)
+        if given is None or not given.command:
+            name = _COMMANDS[SURFACES[control]]
+            node = self._node(name)
+            return [(name, 1.0, Lever(node.set_double_value, node.get_double_value))]
+        key = f"controls.{control}.command_property"
+        found = []
+        for each in given.command:
+            name, sign = each.removeprefix("-"), -1.0 if each.startswith("-") else 1.0
+            found.append((name, sign, self.lever(name, self._file, key)))
+        return found
+
     def _reads(self, names: Iterable[str], key: str = "model", file: object = None) -> list[Read]:
         return [self._node(name, key, file).get_double_value for name in names]
 
@@ -232,12 +302,7 @@ class JSBSimAirframe:
         fdm["ic/h-sl-ft"] = flight.altitude / FOOT_m
         fdm["ic/vc-kts"] = flight.calibrated_airspeed / KNOT_m_per_s
         fdm["ic/gamma-deg"] = math.degrees(flight.flight_path)
-        fdm["propulsion/set-running"] = -1
-        for engine in range(fdm.get_propulsion().get_num_engines()):
-            for lever in ("mixture", "advance"):
-                node = self._properties.get_node(f"fcs/{lever}-cmd-norm[{engine}]")
-                if node is not None:
-                    node.set_double_value(1.0)
+        self._start_engines()
         for wrapper in wrappers:
             wrapper.load(self)
         for name, value in flight.properties.items():
@@ -248,21 +313,45 @@ class JSBSimAirframe:
             f"{flight.model} does not trim{path} at altitude_m = {flight.altitude:g},"
             f" calibrated_airspeed_m_per_s = {flight.calibrated_airspeed:g}"
         )
-        problem = ""
+        problem, started = "", False
+        elevators = [(sign, lever.set) for _, sign, lever in self._levers_of("column")]
         try:
             started = fdm.run_ic()
             for wrapper in wrappers:
                 wrapper.weigh(self)
             if started and flight.trim == "newton":
-                problem = newton_trim(fdm, flight)
+                problem = newton_trim(fdm, flight, elevators)
             elif started:
                 fdm["simulation/do_simple_trim"] = 1
         except (RuntimeError, jsbsim.BaseError) as error:
-            problem = "JSBSim: " + " ".join((_log.text or str(error)).split())[-120:]
+            said = _log.text or str(error)
+            if "does not exist" in f"{said}{error}" and (unmade := self._unmade()) is not None:
+                raise unmade from None
+            problem = "JSBSim: " + " ".join(said.split())[-120:]
         if problem:
-            raise self.fault("calibrated_airspeed_m_per_s", f"{where}: {problem}; choose others")
+            if started:
+                problem = self._why(elevators) or problem
+            raise self.fault(UNTRIMMED, f"{where}: {problem}; choose others")
         if not started or not math.isfinite(fdm["aero/alpha-rad"]):
             raise self.fault("model", f"{flight.model} does not start: {_log.text.strip()[-200:]}")
+
+    def _start_engines(self) -> None:
+        self._fdm["propulsion/set-running"] = -1
+        for engine in range(self._fdm.get_propulsion().get_num_engines()):
+            for lever in ("mixture", "advance"):
+                node = self._properties.get_node(f"fcs/{lever}-cmd-norm[{engine}]")
+                if node is not None:
+                    node.set_double_value(1.0)
+
+    def _why(self, elevators: Elevators) -> str:
+        """Return why a started aircraft does not trim, in words; empty if that is not known."""
+        try:
+            why = why_unbalanced(self._fdm, self._flight, elevators)
+        except (RuntimeError, jsbsim.BaseError):
+            return ""
+        if why or self._flight.trim == "newton":
+            return why
+        return 'JSBSim\'s trim does not find the balance that there is; try trim = "newton"'
 
     def restart(self) -> None:
         """Reset and trim the aircraft; only one without acting wrappers (`kept`)."""

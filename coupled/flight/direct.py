@@ -16,6 +16,10 @@ from coupled.flight.aircraft import make_aircraft
 from coupled.record.channels import SURFACES, motion_channels
 from coupled.rig.parameters import Flight
 
+_ANSWERS_s = 0.1  # from the surface's first motion, over which the aircraft turns
+_LATEST_s = 1.0  # of a surface behind a delay of the model's own
+_MOVED_rad = 1e-4
+
 
 def check_direct_controls(
     flight: Flight,
@@ -28,8 +32,8 @@ def check_direct_controls(
 
     Direct means: within one step the surface is at its new position, stays there, and the aircraft
     turns to the side of the rig's signs. If the rig requires no direct controls, the surface need
-    only have moved. Returns {control: surface travel in rad per unit of command}. Cached by
-    aircraft, since a sweep has few.
+    only move within a second, as behind an actuator with a delay. Returns {control: surface travel
+    in rad per unit of command}. Cached by aircraft, since a sweep has few.
     """
     return _travel(flight.model_dump_json(), frame_s, tuple(controls), tuple(models), file)
 
@@ -44,9 +48,10 @@ def _travel(
 ) -> Mapping[str, float]:
     rates = {"column": "pitch_rate_rad_per_s", "wheel": "roll_rate_rad_per_s"}
     flight = Flight.model_validate_json(flight_json)
-    frames = max(2, round(0.1 / frame_s))
+    frames = max(2, round(_ANSWERS_s / frame_s))
+    flown = frames if flight.direct_controls else frames + round(_LATEST_s / frame_s)
     channels = motion_channels(controls, flown=True)
-    fly = partial(_fly, flight, frame_s, controls, models, file, frames)
+    fly = partial(_fly, flight, frame_s, controls, models, file, flown)
     still = fly((0.0, 0.0, 0.0))
     travel = {}
     for i, control in enumerate(controls):
@@ -57,13 +62,16 @@ def _travel(
         at = channels.index(f"{surface}_rad")
         turn = channels.index(rates.get(control, "yaw_rate_rad_per_s"))
         positions = [a[at] - b[at] for a, b in zip(moved, still, strict=True)]
-        rate = moved[-1][turn] - still[-1][turn]
-        first, last = positions[0], positions[-1]
+        begins = next((k for k, place in enumerate(positions) if abs(place) >= _MOVED_rad), 0)
+        answers = min(begins + frames, flown) - 1
+        rate = moved[answers][turn] - still[answers][turn]
+        first, last = positions[0], positions[answers]
         fault = ""
         if not flight.direct_controls:
             first = last
-        if not math.isfinite(first) or abs(first) < 1e-4:
-            fault = f"does not move its {surface} at once"
+        if not math.isfinite(first) or abs(first) < _MOVED_rad:
+            within = "at once" if flight.direct_controls else f"within {_LATEST_s:g} s"
+            fault = f"does not move its {surface} {within}"
         elif abs(last - first) > 0.25 * abs(first):
             fault = f"moves its {surface} by more than the command (a control law or a lag)"
         elif rate <= 0.0:

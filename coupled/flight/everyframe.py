@@ -118,6 +118,45 @@ def motion_reader(longitudinal: Sequence[Read], lateral: Sequence[Read]) -> Moti
     return Motion(all_controls, all_controls)
 
 
+def mean_reader(terms: Sequence[tuple[float, Read]]) -> Read:
+    """Return the function that reads a sum of factors times properties."""
+    if len(terms) == 1 and terms[0][0] == 1.0:
+        return terms[0][1]
+
+    def mean() -> float:
+        return sum(factor * read() for factor, read in terms)
+
+    return mean
+
+
+def command_writes(levers: Sequence[Sequence[tuple[str, float, Lever]]]) -> list[Write]:
+    """Return the setter of each control's command, and the command in trim.
+
+    `levers` are each control's properties: name, sign, and how to set it. A property that several
+    controls command, as an elevon's, gets its value in trim and the sum of their commands.
+    """
+    now = [0.0] * len(levers)
+    shares: dict[str, list[tuple[int, float]]] = {}
+    for i, each in enumerate(levers):
+        for name, sign, _ in each:
+            shares.setdefault(name, []).append((i, sign))
+
+    def write_of(i: int) -> Write:
+        (name, sign, lever), *others = levers[i]
+        if not others and sign > 0.0 and len(shares[name]) == 1:
+            return lever.set, lever.read()
+        parts = [(lever.set, lever.read(), shares[name]) for name, _, lever in levers[i]]
+
+        def write(command: float) -> None:
+            now[i] = command
+            for set_value, trim, commanded in parts:
+                set_value(trim + sum(sign * now[j] for j, sign in commanded))
+
+        return write, 0.0
+
+    return [write_of(i) for i in range(len(levers))]
+
+
 def stepper(
     run: Callable[[], bool],
     writes: Sequence[Write],

@@ -23,6 +23,7 @@ from coupled.flight.gusts import Gusts
 from coupled.flight.kept import AircraftCache, CachedAircraft
 from coupled.flight.manoeuvre import Manoeuvre
 from coupled.flight.started import StartedFlight
+from coupled.flight.trimmable import with_speeds
 from coupled.record.channels import SURFACES
 from coupled.record.record import Record
 from coupled.resources import aircraft_folder
@@ -93,8 +94,10 @@ def make_airframe(manoeuvre: Manoeuvre, air_m_per_s: Sequence[float] | None = No
             ),
             gusts=Gusts(rig.flight, frame_s, manoeuvre.seed, air_m_per_s),
         )
-    except InputError as error:
-        if source is None or error.key not in source.changes:
-            raise
-        place = f"case {manoeuvre.label!r}: rig.{error.key}"
-        raise InputError(source.run_file, place, error.problem) from None
+    except InputError as fault:
+        make = partial(make_aircraft, frame_s=frame_s, models=models, file=rig_file)
+        error = with_speeds(fault, rig.flight, make)
+        if source is not None and error.key in source.changes:
+            place = f"case {manoeuvre.label!r}: rig.{error.key}"
+            error = InputError(source.run_file, place, error.problem)
+        raise error from None

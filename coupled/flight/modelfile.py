@@ -6,6 +6,7 @@ the model's other files. The model's own folder is never written to.
 
 from __future__ import annotations
 
+import re
 import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -13,9 +14,10 @@ from functools import lru_cache
 from pathlib import Path
 from xml.etree import ElementTree
 
-from coupled.files import clear_temporary, temporary_folder
+from coupled.errors import InputError
+from coupled.files import MOST_TEXT_bytes, clear_temporary, read_bytes, temporary_folder
 from coupled.flight.modelparts import Part
-from coupled.flight.modeltext import ModelText
+from coupled.flight.modeltext import ModelText, UnreadableModelError, read_xml
 
 Element = ElementTree.Element
 # Point masses of zero, last in a model's list; `loading` sets their weights and positions.
@@ -31,6 +33,38 @@ def _is_model(folder: Path) -> bool:
     return (folder / f"{folder.name}.xml").is_file()
 
 
+_PART = r"[A-Za-z_][\w.\-]*(?:\[\d+\])?"
+_PATH = re.compile(rf"-?(/?{_PART}(?:/{_PART})+)").fullmatch
+_READING = frozenset(
+    ("property", "p", "input", "test", "condition", "independentVar", "min", "max", "setpoint")
+)
+
+
+def properties_read(main: Path) -> set[str]:
+    """Return the names of the properties that a model's files read or declare.
+
+    `main` is its main file. Files that are not XML are left out.
+    """
+    found, waiting, known = set[str](), [main], set[Path]()
+    while waiting:
+        file = waiting.pop()
+        if file in known or not file.is_file():
+            continue
+        known.add(file)
+        try:
+            elements = list(read_xml(file).iter())
+        except (UnreadableModelError, InputError):
+            continue
+        for element in elements:
+            words = (element.text or "").split() if element.tag in _READING else []
+            words.append(element.get("value", ""))
+            found |= {match[1].replace("[0]", "") for word in words if (match := _PATH(word))}
+            if own := element.get("file", "").removesuffix(".xml"):
+                folders = ("", "Engines", "Systems")
+                waiting += [main.parent / folder / f"{own}.xml" for folder in folders]
+    return found
+
+
 @lru_cache(maxsize=8)
 def catalogue(text: str) -> Mapping[str, str]:
     """Return the access of each property in a model's catalogue: R, W or RW."""
@@ -38,19 +72,24 @@ def catalogue(text: str) -> Mapping[str, str]:
 
 
 @contextmanager
-def loadable(models: Path, name: str, scaled: Sequence[Part], ballasts: int = 0) -> Iterator[Path]:
+def loadable(main: Path, scaled: Sequence[Part], ballasts: int = 0) -> Iterator[Path]:
     """Yield the folder of models from which to load a model, with parts of it scalable.
 
-    It has `ballasts` more point masses, of zero weight. Raises NothingToScaleError,
-    UnreadableModelError for a file that is not XML, or OSError if a temporary folder cannot be
-    written.
+    `main` is the model's main file. JSBSim gives the folder of a model and its file one name, so
+    a file of another name gets that of the folder. The model has `ballasts` more point masses, of
+    zero weight. Raises NothingToScaleError, UnreadableModelError for a file that is not XML, or
+    OSError if a temporary folder cannot be written.
     """
-    if not scaled and not ballasts:
-        yield models
+    folder = main.parent
+    name = folder.name
+    if not scaled and not ballasts and main.stem == name:
+        yield folder.parent
         return
-    folder = models / name
-    state = (folder / f"{name}.xml").stat()
-    text = _scalable(folder, tuple(scaled), ballasts, state.st_mtime_ns, state.st_size)
+    if scaled or ballasts:
+        state = main.stat()
+        text = _scalable(main, tuple(scaled), ballasts, state.st_mtime_ns, state.st_size)
+    else:
+        text = read_bytes(main, MOST_TEXT_bytes)
     clear_temporary()
     temporary = temporary_folder()
     try:
@@ -78,10 +117,10 @@ def _stand_in(place: Path, entry: Path) -> None:
 
 @lru_cache(maxsize=16)
 def _scalable(
-    folder: Path, scaled: tuple[Part, ...], ballasts: int, changed_ns: int, size: int
+    main: Path, scaled: tuple[Part, ...], ballasts: int, changed_ns: int, size: int
 ) -> bytes:
     """Return a model's text with parts of it scalable; `changed_ns` and `size` key the cache."""
-    model = ModelText.of(folder.parent, folder.name)
+    model = ModelText.of(main)
     for part in scaled:
         part.make_scalable(model)
     balance = model.section("mass_balance") if ballasts else None

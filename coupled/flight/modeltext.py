@@ -35,16 +35,16 @@ class ModelText:
     folder: Path
 
     @classmethod
-    def of(cls, models: Path, name: str) -> ModelText:
-        """Read a model in a folder of models."""
-        return cls(_read(models / name / f"{name}.xml"), models / name)
+    def of(cls, main: Path) -> ModelText:
+        """Read a model, given its main file."""
+        return cls(read_xml(main), main.parent)
 
     def section(self, name: str) -> Element | None:
         """Return a section, read from its own file if it has one, or None."""
         section = self.root.find(name)
         if section is not None and (file := section.attrib.pop("file", None)) is not None:
             own = self.folder / (file if file.endswith(".xml") else f"{file}.xml")
-            section[:] = list(_read(own))
+            section[:] = list(read_xml(own))
         return section
 
 
@@ -59,13 +59,13 @@ def axis_of(axis: Element) -> str:
     return axis.get("name", "").strip()
 
 
-def functions_of(models: Path, name: str) -> dict[str, str]:
-    """Return the axis of each named aerodynamic function of a model in a folder of models.
+def functions_of(main: Path) -> dict[str, str]:
+    """Return the axis of each named aerodynamic function of a model, given its main file.
 
     It is empty for a function outside the axes, to which others refer. Raises UnreadableModelError
     for a file that is not XML.
     """
-    aerodynamics = ModelText.of(models, name).section("aerodynamics")
+    aerodynamics = ModelText.of(main).section("aerodynamics")
     if aerodynamics is None:
         return {}
     axes = {
@@ -76,5 +76,6 @@ def functions_of(models: Path, name: str) -> dict[str, str]:
     return {n: axes.get(id(f), "") for n, f in named_functions(aerodynamics).items()}
 
 
-def _read(file: Path) -> Element:
+def read_xml(file: Path) -> Element:
+    """Return the root of a model's file. Raises UnreadableModelError, or InputError."""
     return parsed(read_bytes(file, MOST_TEXT_bytes), file.name)

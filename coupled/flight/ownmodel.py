@@ -26,11 +26,12 @@ from coupled.rig.parameters import Flight
 
 TRIED = "coupled.flight.tryout"  # module of that process
 REFUSED = 3  # exit code of a process that reports the fault itself
+UNMADE = 4  # likewise, of properties that nothing creates
 LONGEST_s = 60.0  # a packaged model takes less than 2 s on a slow machine
 # Keys of a flight section that change the loaded files or their content.
 _LOADED = (
-    *("model", "folder", "steps_per_frame", "trim", "cg_aft", "fuel", "mass", *INERTIAS, "terms"),
-    *(alteration.part.name for alteration in ALTERATIONS),
+    *("model", "folder", "model_file", "steps_per_frame", "trim", "cg_aft", "fuel", "mass"),
+    *(*INERTIAS, "terms", *(alteration.part.name for alteration in ALTERATIONS)),
 )
 _MOST_FILES = 10_000
 
@@ -45,10 +46,13 @@ def check_own_model(
     home = _own_home(flight, models)
     if home is None:
         return
-    asked = json.dumps([getattr(flight, name) for name in _LOADED])
+    named = sorted(flight.properties)
+    asked = json.dumps([*(getattr(flight, name) for name in _LOADED), named])
     said = _tried(
         str(home), _state(home / flight.model), asked, _Request(flight, frame_s, tuple(controls))
     )
+    if said.startswith(flight.model):
+        raise InputError(file, "flight.properties", said)
     if said:
         raise InputError(file, "flight.model", f"{flight.model} {said}")
 
@@ -113,7 +117,10 @@ def _tried(home: str, state: object, asked: str, request: _Request) -> str:
     if done.returncode == 0:
         return ""
     lines = [line.strip() for line in done.stderr.decode("utf-8", "replace").splitlines()]
-    last = next((line for line in reversed(lines) if line), "")[-200:]
+    last = next((line for line in reversed(lines) if line), "")
+    if done.returncode == UNMADE:
+        return last
+    last = last[-200:]
     if done.returncode == REFUSED:
         return f"cannot be loaded: {last}"
     why = f"crashes JSBSim when loaded ({_how(done.returncode)}): a fault of its files"

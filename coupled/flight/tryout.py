@@ -1,19 +1,21 @@
 """The process in which a user's model is loaded, trimmed and flown for some frames (`ownmodel`).
 
-Its exit code is 0 if that succeeds, or fails with a fault that the parent will find as well; and
-REFUSED, with the reason on the standard error, if Python cannot read the model.
+Its exit code is 0 if that succeeds, or fails with a fault that the parent will find as well. With
+the reason on the standard error it is REFUSED if Python cannot read the model, and UNMADE if the
+model reads properties that nothing creates.
 """
 
 from __future__ import annotations
 
 import faulthandler
 import json
+import os
 import sys
 from pathlib import Path
 
 from coupled.errors import InputError
 from coupled.flight.aircraft import make_unchecked
-from coupled.flight.ownmodel import REFUSED
+from coupled.flight.ownmodel import REFUSED, UNMADE
 from coupled.parallel import limit_memory
 from coupled.rig.parameters import Flight
 
@@ -30,8 +32,11 @@ def main() -> int:
         made = make_unchecked(flight, task["frame_s"], task["controls"], [Path(task["home"])])
         for _ in range(_FRAMES):
             made.step((0.0, 0.0, 0.0))
-    except InputError:
-        return 0
+    except InputError as error:
+        if error.key != "flight.properties":
+            return 0
+        print(error.problem, file=sys.stderr, flush=True)
+        os._exit(UNMADE)  # JSBSim aborts where it deletes a model that reads such a property
     except Exception as error:
         print(f"{type(error).__name__}: {error}".replace("\n", " "), file=sys.stderr)
         return REFUSED

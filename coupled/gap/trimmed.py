@@ -13,6 +13,7 @@ from typing import Any
 
 from coupled.errors import InputError
 from coupled.flight.aircraft import make_aircraft
+from coupled.flight.altered import STILL
 from coupled.gap.checks import SPEED, start_of
 from coupled.gap.thresholds import OTHER_SPEED, OTHER_PATH_rad
 from coupled.record.channels import motion_channels
@@ -148,6 +149,6 @@ def _measured_trim(rig: Rig, record: Record, file: str) -> dict[str, Any]:
 def trim_speed(rig: Rig) -> float:
     """Return the true airspeed at which the rig's aircraft is trimmed, m/s."""
     assert rig.flight is not None
-    still = changed(rig.flight, {"gust_rms_m_per_s": 0.0}, rig.name, "flight")
+    still = changed(rig.flight, STILL, rig.name, "flight")
     airframe = make_aircraft(still, 1.0 / rig.frame_rate, ["column"], [aircraft_folder()])
     return airframe.motion()[motion_channels(["column"], flown=True).index(SPEED)]

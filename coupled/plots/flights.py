@@ -27,6 +27,7 @@ from coupled.plots.pages import deflection_shown
 from coupled.record.channels import RATE, channel
 from coupled.rig.equations import specified_force
 from coupled.rig.packing import COMMAND_SIGN
+from coupled.rig.surface import share_of_travel
 from coupled.units import DEGREE_rad
 
 if TYPE_CHECKING:
@@ -248,7 +249,7 @@ def _draw_surface(axes: Any, case: Sequence[Flight]) -> None:
         axes.plot(record.time_s, moved, **_line(flight))
     record = case[-1].record
     deflection = true_deflection(case[-1].manoeuvre.rig, control, record)
-    asked = 100.0 * np.clip(deflection / data.travel, -1.0, 1.0)
+    asked = 100.0 * np.clip(share_of_travel(data, deflection), -1.0, 1.0)
     axes.plot(record.time_s, asked, color="0.65", linewidth=3.5, zorder=0, label="asked, specified")
     stop = next((s for f in case if (s := f.outcome.surface_stop_norm) is not None), None)
     if stop is not None:

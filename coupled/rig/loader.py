@@ -77,7 +77,7 @@ class LoaderState(SpringState, DelayState, Protocol):
 
 
 def stop_of(travel: float, stop: float) -> float:
-    """Return a control's stop on one side, d: its travel, or a `stop` within it."""
+    """Return a control's stop on one side, d: its `travel` there, or a `stop` within it."""
     return min(travel, stop) if stop > 0.0 else travel
 
 
@@ -88,8 +88,8 @@ LOADER = Declaration(
     | {
         "delay_substeps": lambda g: g.control.loader.delay / g.substep_s,
         "travel": lambda g: g.control.travel,
-        "aft": lambda g: stop_of(g.control.travel, g.control.loader.stop_aft),
-        "forward": lambda g: stop_of(g.control.travel, g.control.loader.stop_forward),
+        "aft": lambda g: stop_of(g.control.pull, g.control.loader.stop_aft),
+        "forward": lambda g: stop_of(g.control.push, g.control.loader.stop_forward),
     },
     state=layout(LoaderState, history=(DELAY_SLOTS,)),
     fixed=("external", "mass", "damping", "neutral"),

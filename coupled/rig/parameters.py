@@ -7,13 +7,14 @@ effect out. Signs: pull, clockwise and right foot forward are positive.
 
 from __future__ import annotations
 
+import re
 from itertools import pairwise
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, ValidationInfo, field_validator
+from pydantic import Field, PlainValidator, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
-from coupled.schema import Section, named, quantity, text_like
+from coupled.schema import Section, derived, named, quantity, text_like
 
 # A name usable in a file name: letters, digits, dot, dash, underscore.
 PLAIN_NAME = r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,79}$"
@@ -266,12 +267,46 @@ class Calibration(Section):
     s3_over_s2: float = quantity("", 0.0, ge=0)
 
 
+_PART = r"[A-Za-z_][\w.\-]{0,80}(\[\d{1,4}\])?"
+_PROPERTY = re.compile(rf"-?{_PART}(/{_PART}){{1,15}}").fullmatch
+
+
+def _properties(given: Any) -> str | list[str]:
+    names = [given] if isinstance(given, str) else given
+    if not isinstance(names, list) or len(names) > 8:
+        names = [None]
+    if not all(isinstance(name, str) and _PROPERTY(name) for name in names):
+        raise ValueError(
+            "should be a JSBSim property, as fcs/stabilator-pos-rad, or a list of up to 8"
+        )
+    kept: str | list[str] = given
+    return kept
+
+
+Properties = Annotated[str | list[str], PlainValidator(_properties)]
+
+
+class SurfaceProperties(Section):
+    """A model's own properties of a surface; empty for JSBSim's usual ones.
+
+    `command` are all moved by the control's command; the position is the mean of `position`. One
+    with a minus before it has the opposite sign.
+    """
+
+    command: list[str] = []
+    position: list[str] = []
+
+
 class Control(Section):
     """One control of the rig."""
 
     surface: Literal["elevator", "aileron", "rudder"]
+    command_property: Properties = []
+    surface_property: Properties = []
     drive: Literal["force", "displacement", "setpoint"] = "force"
     travel: float = quantity("{d}", gt=0)
+    travel_pull: float = quantity("{d}", 0.0, ge=0)
+    travel_push: float = quantity("{d}", 0.0, ge=0)
     length: float = quantity("m", 0.0, ge=0)
     loader: Loader
     schedule: Schedule
@@ -284,6 +319,25 @@ class Control(Section):
     # Tolerances of the numbers above: half a 95 % interval by key, in the key's unit.
     tolerance: dict[str, float] = {}
     guesses: list[str] = []  # keys of numbers that nobody measured
+
+    @property
+    def pull(self) -> float:
+        """Travel in the positive direction, d: a pull, a clockwise turn, right foot forward."""
+        return self.travel_pull or self.travel
+
+    @property
+    def push(self) -> float:
+        """Travel in the negative direction, d, as a size."""
+        return self.travel_push or self.travel
+
+    @property
+    def properties(self) -> SurfaceProperties:
+        """The model's own properties of the surface."""
+        command, position = (
+            [given] if isinstance(given, str) else given
+            for given in (self.command_property, self.surface_property)
+        )
+        return SurfaceProperties(command=command, position=position)
 
     @property
     def assumed_basic_gradient(self) -> float:
@@ -305,6 +359,10 @@ class Flight(Section):
         str, text_like(r"[^\x00-\x1f\x7f/\\]{1,120}", "should be the name of a JSBSim model")
     ]
     folder: str = named("model_folder", "")
+    model_file: Annotated[
+        str,
+        text_like(r"[^\x00-\x1f\x7f/\\]{0,120}", "should be a file of the model's folder"),
+    ] = ""
     altitude: float = quantity("m")
     calibrated_airspeed: float = quantity("m_per_s", gt=0)
     flight_path: float = quantity("rad", 0.0, ge=-0.6, le=0.6)
@@ -338,6 +396,14 @@ class Flight(Section):
     gust_length: float = quantity("m", 150.0, gt=0)
     properties: dict[str, float] = {}
     terms: dict[str, Annotated[float, Field(ge=0, le=10)]] = {}
+    # By control, those of its section of the rig: they belong to the model.
+    surfaces: dict[str, SurfaceProperties] = derived({})
+
+    @property
+    def main_file(self) -> str:
+        """The model's main file, relative to the folder of all models."""
+        file = self.model_file.removesuffix(".xml") or self.model
+        return f"{self.model}/{file}.xml"
 
     @property
     def still(self) -> bool:

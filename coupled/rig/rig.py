@@ -233,6 +233,10 @@ def _check_control(rig: Rig, name: str, control: Control, file: object) -> None:
         raise InputError(
             file, f"{path}.surface", f"a {name} moves the {SURFACES[name]}, not {control.surface}"
         )
+    for side in ("travel_pull", "travel_push"):
+        if getattr(control, side) > control.travel:
+            problem = f"is above travel_{d} = {control.travel:g}, which is that of the longer side"
+            raise InputError(file, f"{path}.{side}_{d}", problem)
     loader = control.loader
     if 0 < loader.breakaway < loader.friction:
         raise InputError(

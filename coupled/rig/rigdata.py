@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Self
+
+from pydantic import model_validator
+
 from coupled.arguments import public
 from coupled.errors import InputError
 from coupled.record.channels import ControlName
-from coupled.rig.parameters import Control, Flight, PlainName
+from coupled.rig.parameters import Control, Flight, PlainName, SurfaceProperties
 from coupled.rig.structure import Structure
 from coupled.schema import Section, quantity
 
@@ -20,6 +24,16 @@ class RigData(Section):
     flight: Flight | None = None
     noise: dict[str, float] = {}
     structure: Structure = Structure()
+
+    @model_validator(mode="after")
+    def _give_surfaces(self) -> Self:
+        """Give the aircraft the surfaces' properties of the controls."""
+        if self.flight is not None:
+            each = {str(name): control.properties for name, control in self.controls.items()}
+            own = {name: given for name, given in each.items() if given != SurfaceProperties()}
+            if own != self.flight.surfaces:
+                self.__dict__["flight"] = self.flight.model_copy(update={"surfaces": own})
+        return self
 
     @public
     def check_controlled(self, file: object = None) -> None:

@@ -34,14 +34,15 @@ def _placed(flight: Any, file: object) -> Any:
         return flight
     base = file.parent if isinstance(file, Path) else Path()
     name = flight.get("model")
+    wanted = f"{name}/{str(flight.get('model_file') or name).removesuffix('.xml')}.xml"
     try:
         folder = (base / given).resolve()
-        there = not isinstance(name, str) or (folder / name / f"{name}.xml").is_file()
+        there = not isinstance(name, str) or (folder / wanted).is_file()
     except (OSError, ValueError):  # not a valid name of a folder
         problem = "is no name of a folder; give the folder that the model's lies in"
         raise InputError(file, "flight.model_folder", problem) from None
     if not there:
-        problem = f"{given!r} holds no {name}/{name}.xml; give the folder that the model's lies in"
+        problem = f"{given!r} holds no {wanted}; give the folder that the model's lies in"
         raise InputError(file, "flight.model_folder", problem)
     return {**flight, "model_folder": str(folder)}
 

@@ -56,7 +56,8 @@ class ServicesParameters(Protocol):
 
     present: int  # the rig file has some
     frame: float  # s
-    travel: float  # d
+    pull: float  # travel to the positive side, d
+    push: float  # and to the negative, as a size
     trim_release_gradient: float  # k_r, N/d
     trim_release_damping: float  # c_r, N·s/d
     autopilot_stiffness: float  # N/d
@@ -129,7 +130,8 @@ SERVICES = Declaration(
     derived={
         "present": lambda g: g.control.services != Services(),
         "frame": lambda g: g.frame_s,
-        "travel": lambda g: g.control.travel,
+        "pull": lambda g: g.control.pull,
+        "push": lambda g: g.control.push,
     },
     state=layout(ServicesState, row=(len(SERVICE_CHANNELS),)),
     fixed=(
@@ -164,7 +166,7 @@ def begin_services(
     s.shaking = s.shaker > 0.5 or (p.shaker_alpha > 0.0 and alpha >= p.shaker_alpha)
     if s.shaking == 0:
         s.time = 0.0
-    surface = s.asked / p.travel
+    surface = s.asked / (p.pull if s.asked > 0.0 else p.push)
     s.slow = -p.pusher * s.pushing
     s.slow -= pressure * (p.hinge_alpha * (alpha - s.alpha) + p.hinge_surface * surface)
     if p.envelope > 0.0:
@@ -235,8 +237,8 @@ def _move_other(p: ServicesParameters, s: ServicesState, loader: LoaderState, h:
     force -= p.other_gradient * (s.other - loader.neutral)
     s.other_rate += h * force / p.other_mass
     s.other += h * s.other_rate
-    if abs(s.other) > p.travel:
-        s.other = min(max(s.other, -p.travel), p.travel)
+    if s.other > p.pull or s.other < -p.push:
+        s.other = min(max(s.other, -p.push), p.pull)
         s.other_rate = 0.0
 
 

@@ -20,6 +20,7 @@ from coupled.rig.control import ControlArray
 from coupled.rig.parameters import Control, Services
 from coupled.rig.rig import Rig
 from coupled.rig.services import SERVICE_CHANNELS
+from coupled.rig.surface import share_of_travel
 
 Floats = NDArray[np.float64]
 
@@ -99,8 +100,8 @@ def held_force(rig: Rig, record: Record, control: str) -> Floats | None:
     if "asked" in rows:
         asked = np.concatenate(([0.0], rows["asked"][:-1]))  # at the start of the frame
         moment = of.hinge_alpha * (rows["alpha"] - rows["alpha"][0])
-        travel = rig.controls[cast(ControlName, control)].travel
-        held -= rows["q"] * (moment + of.hinge_surface * asked / travel)
+        share = share_of_travel(rig.controls[cast(ControlName, control)], asked)
+        held -= rows["q"] * (moment + of.hinge_surface * share)
     if "load" in rows:
         held -= of.envelope * np.maximum(rows["load"] - of.envelope_above, 0.0)
         held += of.envelope_push * np.maximum(of.envelope_below - rows["load"], 0.0)

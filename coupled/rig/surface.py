@@ -1,6 +1,6 @@
 """Surface: from the host's estimate of the deflection to a command for the model.
 
-    u = sign·δ̂/travel, clipped to ±1            the linkage of the aircraft
+    u = sign·δ̂/travel, clipped to ±1            the linkage; the travel of a pull or of a push
     cable stretch   u/(1 + loss·q̄)              under air load
     lag             τ·y' = u − y
     rate limit      |y'| ≤ rate
@@ -14,14 +14,19 @@ from __future__ import annotations
 
 from typing import Protocol
 
+import numpy as np
+from numpy.typing import NDArray
+
 from coupled.rig.compiled import TINY, layout, stage
 from coupled.rig.declaration import Declaration, first_order_gain
+from coupled.rig.parameters import Control
 
 
 class SurfaceParameters(Protocol):
     """The chain from the column to the surface."""
 
-    gain: float  # sign/travel, 1/d
+    gain: float  # sign/travel of a pull, 1/d
+    gain_push: float  # and of a push
     stretch: float  # loss, 1/Pa
     lag_gain: float  # 1 − exp(−T/τ) over a frame; 1 without lag
     rate_step: float  # largest motion in a frame; 0 for no limit
@@ -44,7 +49,8 @@ SURFACE = Declaration(
     layout(SurfaceParameters),
     section="control.rigging",
     derived={
-        "gain": lambda g: COMMAND_SIGN[g.control.surface] / g.control.travel,
+        "gain": lambda g: COMMAND_SIGN[g.control.surface] / g.control.pull,
+        "gain_push": lambda g: COMMAND_SIGN[g.control.surface] / g.control.push,
         "stretch": lambda g: g.control.rigging.stretch_loss,
         "lag_gain": lambda g: first_order_gain(g.control.rigging.lag, g.frame_s),
         "rate_step": lambda g: g.control.rigging.rate_limit * g.frame_s,
@@ -53,10 +59,17 @@ SURFACE = Declaration(
 )
 
 
+def share_of_travel(control: Control, deflection: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return deflections in d as shares of the travel on their side, pull positive."""
+    share: NDArray[np.float64] = deflection / np.where(deflection > 0.0, control.pull, control.push)
+    return share
+
+
 @stage
 def static_command(p: SurfaceParameters, estimate: float, dynamic_pressure: float) -> float:
     """Return the linkage's command, in ±1, for δ̂ in d and q̄ in Pa."""
-    commanded = min(max(p.gain * estimate, -1.0), 1.0)
+    gain = p.gain if estimate > 0.0 else p.gain_push
+    commanded = min(max(gain * estimate, -1.0), 1.0)
     return commanded / (1.0 + p.stretch * dynamic_pressure)
 
 

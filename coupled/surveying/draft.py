@@ -86,8 +86,8 @@ def kind_of(mass_kg: float) -> Kind:
 def draft(found: Surveyed, name: str, folder: str = "", airframe_only: bool = False) -> str:
     """Return the text of a first rig file for a surveyed model that trims.
 
-    `folder` is where the model's own lies, from the rig file's place, where coupled does not
-    find it by itself. `airframe_only` leaves out the controls.
+    `folder` is the folder of models of a user's own model, relative to the rig file.
+    `airframe_only` leaves out the controls.
     """
     if airframe_only:
         head = [f"# {found.model}: an aircraft without controls, written by `coupled new rig`."]
@@ -114,9 +114,11 @@ def _flight(found: Surveyed, folder: str) -> list[str]:
     flight = found.flight
     assert flight is not None
     holds = "holds it hands off" if found.holds else "does not hold it hands off: fly short runs"
-    lines = ["", "[flight]", f'model = "{found.model}"']
+    lines = ["", "[flight]", f"model = {json.dumps(flight.model)}"]
     if folder:
-        lines.append(f"model_folder = {json.dumps(folder)}  # where {found.model}/ lies")
+        lines.append(f"model_folder = {json.dumps(folder)}  # where {flight.model}/ lies")
+    if flight.model_file:
+        lines.append(f"model_file = {json.dumps(flight.model_file)}")
     lines.append(f"altitude_m = {flight.altitude:g}               # it trims here, and {holds}")
     speed = f"calibrated_airspeed_m_per_s = {flight.calibrated_airspeed:g}"
     if found.slowest < found.fastest:

@@ -13,9 +13,10 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from coupled.errors import InputError, nearest
 from coupled.files import read_bytes
@@ -47,7 +48,7 @@ class Surveyed:
     """What was found of a model; SI.
 
     `flight` is a state in which it trims and `holds` whether it keeps it hands off; without one,
-    `why` has JSBSim's own reason. `controls` are those that a rig can lead, `direct` whether they
+    `why` has the reason. `controls` are those that a rig can lead, `direct` whether they
     all move their surface at once; `lacking` says what keeps the others out.
     """
 
@@ -80,6 +81,32 @@ class Surveyed:
         }
 
 
+class ModelFile(NamedTuple):
+    """A model's main file: the folder of all models, the model's own, and its file there.
+
+    `file` is empty for a file with the name of its folder.
+    """
+
+    home: Path
+    model: str
+    file: str = ""
+
+    @property
+    def label(self) -> str:
+        """The model's name, and its file's if that differs."""
+        return f"{self.model}/{self.file}" if self.file else self.model
+
+    @property
+    def path(self) -> Path:
+        """The main file."""
+        return self.home / self.model / f"{self.file or self.model}.xml"
+
+    @property
+    def own(self) -> bool:
+        """Whether it is the user's own, which a rig finds by its `model_folder` only."""
+        return known_models().get(self.model) != self.home
+
+
 def known_models() -> dict[str, Path]:
     """Return the models that are here, packaged and our own: {name: folder of all models}."""
     own = aircraft_folder()
@@ -87,37 +114,67 @@ def known_models() -> dict[str, Path]:
     return dict(sorted({**packaged_models(), **ours}.items(), key=lambda one: one[0].lower()))
 
 
-def model_given(word: str) -> tuple[str, Path, bool]:
-    """Return a model's name, the folder of all models in which it lies, and whether it is known.
+def chosen_models(words: Sequence[str]) -> list[ModelFile]:
+    """Return some models, or all that are known.
 
-    `word` is the name of a model that is here, or the folder of another (NAME/NAME.xml). Raises
-    InputError for any other.
-    """
-    known, folder = known_models(), Path(word)
-    if word in known:
-        return word, known[word], True
-    try:
-        own = folder.resolve()
-        there = (own / f"{own.name}.xml").is_file()
-    except (OSError, ValueError):  # a name that no folder can have
-        there = False
-    if not there:
-        problem = f"is no JSBSim model and no folder of one (NAME/NAME.xml); {nearest(word, known)}"
-        raise InputError(word, "", problem)
-    return own.name, own.parent, False
-
-
-def chosen_models(names: Sequence[str], asked_by: str = "coupled.surveying") -> dict[str, Path]:
-    """Return some models, or all that are here, as `known_models` does.
-
-    Raises InputError, `asked_by` in the place of a file, for a model that is not here.
+    A word is a known model, a model's file, its folder, or a folder of models, of which all are
+    returned. Raises InputError for any other.
     """
     known = known_models()
-    for name in names:
-        if name not in known:
-            problem = f"there is no JSBSim model {name!r}; {nearest(name, known)}"
-            raise InputError(asked_by, "", problem)
-    return {name: known[name] for name in names or known}
+    if not words:
+        return [ModelFile(home, name) for name, home in known.items()]
+    return list(dict.fromkeys(each for word in words for each in _models_of(word, known)))
+
+
+def chosen_model(word: str) -> ModelFile:
+    """Return the one model of a word. Raises InputError for a folder of several models."""
+    found = chosen_models([word])
+    main = [each for each in found if not each.file and each.model == Path(word).resolve().name]
+    if len(found) > 1 and not main:
+        labels = ", ".join(each.label for each in found[:5])
+        raise InputError(word, "", f"holds {len(found)} models; name the file of one: {labels}")
+    return (main or found)[0]
+
+
+def _models_of(word: str, known: Mapping[str, Path]) -> list[ModelFile]:
+    if word in known:
+        return [ModelFile(known[word], word)]
+    name, _, file = word.partition("/")
+    if name in known and (packaged := ModelFile(known[name], name, file)).path.is_file():
+        return [packaged]
+    try:
+        path = Path(word).resolve()
+        if path.is_file() and path.suffix == ".xml":
+            return [model_file(path)]
+        found = _models_in(path) or [each for f in sorted(path.iterdir()) for each in _models_in(f)]
+    except (OSError, ValueError):  # no folder, or no name that one can have
+        found = []
+    if not found:
+        problem = f"is no JSBSim model and no folder of one (NAME/NAME.xml); {nearest(word, known)}"
+        raise InputError(word, "", problem)
+    return found
+
+
+def _models_in(folder: Path) -> list[ModelFile]:
+    """Return the models of one folder: the file with its name first, then other main files."""
+    if not folder.is_dir():
+        return []
+    files = sorted(folder.glob("*.xml"), key=lambda file: (file.stem != folder.name, file.name))
+    return [model_file(f) for f in files if f.stem == folder.name or _is_main(f)]
+
+
+def model_file(path: Path) -> ModelFile:
+    """Return the model of a main file."""
+    folder = path.parent
+    return ModelFile(folder.parent, folder.name, "" if path.stem == folder.name else path.stem)
+
+
+def _is_main(file: Path) -> bool:
+    """Tell whether a file is a model's main file, by its root."""
+    try:
+        return parsed(read_bytes(file), file.name).tag == "fdm_config"
+    except (InputError, UnreadableModelError):
+        return False
 
 
 def rigs_by_model() -> dict[str, list[str]]:
@@ -129,16 +186,18 @@ def rigs_by_model() -> dict[str, list[str]]:
     return found
 
 
-def survey(model: str, home: Path, *, speeds: bool = False) -> Surveyed:
-    """Return what is found of a model that lies in the folder `home` of all models.
+def survey(model: ModelFile, *, speeds: bool = False) -> Surveyed:
+    """Return what is found of a model.
 
     With `speeds` the range of speeds is sought as well. Raises nothing for a model that fails.
     """
-    rigs = tuple(rigs_by_model().get(model, ()))
-    mass = _mass_kg(home / model / f"{model}.xml")
+    home = model.home
+    known = not model.own and not model.file
+    rigs = tuple(rigs_by_model().get(model.model, ())) if known else ()
+    mass = _mass_kg(model.path)
     ended_s = time.monotonic() + _LONGEST_s
     found, why = None, ""
-    for flight in _tries(model, home):
+    for flight in _tries(model):
         problem = _trims(flight, home)
         if not problem:
             holds = _holds(flight, home)
@@ -147,11 +206,12 @@ def survey(model: str, home: Path, *, speeds: bool = False) -> Surveyed:
             if holds:
                 break
         else:  # the first try is the likeliest, and its reason the one that counts
-            why = why or problem.partition("JSBSim: ")[2].partition("; choose")[0] or problem
+            found_out = problem.partition("calibrated_airspeed_m_per_s = ")[2].partition(": ")[2]
+            why = why or found_out.partition("; choose")[0] or problem
         if time.monotonic() > ended_s:
             break
     if found is None:
-        return Surveyed(model, None, why=why, rigs=rigs, mass_kg=mass)
+        return Surveyed(model.label, None, why=why, rigs=rigs, mass_kg=mass)
     flight, holds = found
     controls, direct, lacking = _controls(flight, home)
     flight = flight.model_copy(update={"direct_controls": direct})
@@ -159,17 +219,17 @@ def survey(model: str, home: Path, *, speeds: bool = False) -> Surveyed:
     if speeds and controls:
         slowest, fastest = speed_range(flight, home, controls)
     return Surveyed(
-        *(model, flight, holds, "", controls, direct, lacking),
+        *(model.label, flight, holds, "", controls, direct, lacking),
         *(slowest, fastest, mass, rigs),
     )
 
 
-def surveyed(word: str, model: str, home: Path, airframe_only: bool = False) -> Surveyed:
+def surveyed(word: str, model: ModelFile, airframe_only: bool = False) -> Surveyed:
     """Return what is found of a model for a first rig; `word` names it in faults.
 
     Raises InputError if it does not trim or, unless `airframe_only`, has no control for a rig.
     """
-    found = survey(model, home, speeds=not airframe_only)
+    found = survey(model, speeds=not airframe_only)
     if found.flight is None:
         raise InputError(word, "", f"does not trim wherever it was tried: {found.why}")
     if not found.controls and not airframe_only:
@@ -177,16 +237,22 @@ def surveyed(word: str, model: str, home: Path, airframe_only: bool = False) -> 
     return found
 
 
-def _tries(model: str, home: Path) -> Iterator[Flight]:
+def _tries(model: ModelFile) -> Iterator[Flight]:
     """Yield states to try, the likeliest first, with the gear up where there is one to raise."""
-    speeds = _likely_speeds(home / model / f"{model}.xml")
+    speeds, folder = _likely_speeds(model.path), str(model.home) if model.own else ""
     places = [(i + 2 * j, v, h) for i, v in enumerate(speeds) for j, h in enumerate(_ALTITUDES_m)]
     gear: dict[str, float] | None = None
     for _, speed, altitude in sorted(places):
-        flight = Flight(model=model, altitude=altitude, calibrated_airspeed=speed)
+        flight = Flight(
+            model=model.model,
+            folder=folder,
+            model_file=model.file,
+            altitude=altitude,
+            calibrated_airspeed=speed,
+        )
         if gear is None:
             raised = flight.model_copy(update={"properties": _GEAR_UP})
-            lacks = "has no property" in _trims(raised, home)
+            lacks = "has no property" in _trims(raised, model.home)
             gear = {} if lacks else _GEAR_UP
         yield flight.model_copy(update={"properties": gear})
 
@@ -216,7 +282,7 @@ def _quantity(file: Path, tag: str, units: dict[str, float]) -> float:
 
 
 def _trims(flight: Flight, home: Path) -> str:
-    """Return why a model does not trim, in JSBSim's words, or an empty string."""
+    """Return why a model does not trim, or an empty string."""
     try:
         make_aircraft(flight, FRAME_s, ("column",), [home], "model")
     except InputError as error:

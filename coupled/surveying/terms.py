@@ -11,7 +11,6 @@ import itertools
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from os import PathLike, fspath
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
@@ -26,7 +25,7 @@ from coupled.flight.runfile import read_run
 from coupled.record.channels import CONTROL_NAMES
 from coupled.results import Displayed, Tabular, frame_of
 from coupled.rig.parameters import Flight
-from coupled.surveying.survey import FRAME_s, model_given, survey
+from coupled.surveying.survey import FRAME_s, ModelFile, chosen_model, model_file, survey
 
 if TYPE_CHECKING:
     import polars as pl
@@ -103,20 +102,20 @@ def list_terms(
     Raises InputError for a model that is not here, does not trim or has no named functions, and for
     a run of another model.
     """
-    name, home, _ = model_given(fspath(model))
+    chosen = chosen_model(fspath(model))
     try:
-        axes = functions_of(home, name)
+        axes = functions_of(chosen.path)
     except UnreadableModelError as error:
         raise InputError(fspath(model), "", f"does not load: {error}") from None
     if not axes:
         raise InputError(fspath(model), "", "has no named aerodynamic functions")
     if run is None:
-        flight, values = _flown_by_default(name, home, axes, progress or _silent)
+        flight, values = _flown_by_default(chosen, axes, progress or _silent)
         flown = "a doublet and a 3-2-1-1 on each surface"
     else:
-        flight, values = _flown_by_run(name, fspath(run), axes)
+        flight, values = _flown_by_run(chosen, fspath(run), axes)
         flown = f"the run {fspath(run)}"
-    return ModelTerms(name, flight, flown, tuple(_shares(axes, values)))
+    return ModelTerms(chosen.label, flight, flown, tuple(_shares(axes, values)))
 
 
 def _silent(said: str, done: int, whole: int) -> None:
@@ -124,20 +123,20 @@ def _silent(said: str, done: int, whole: int) -> None:
 
 
 def _flown_by_default(
-    name: str, home: Path, terms: Iterable[str], report: Progress
+    model: ModelFile, terms: Iterable[str], report: Progress
 ) -> tuple[Flight, Values]:
     """Return the trim found for a model, and each term's values over the default flight."""
-    report(f"where {name} trims", 0, 1)
-    flight = survey(name, home).flight
+    report(f"where {model.label} trims", 0, 1)
+    flight = survey(model).flight
     if flight is None:
-        raise InputError(name, "", "does not trim wherever it was tried; give a run (--run)")
-    aircraft = make_aircraft(flight, FRAME_s, CONTROL_NAMES, [home], "model")
+        raise InputError(model.label, "", "does not trim wherever it was tried; give a run (--run)")
+    aircraft = make_aircraft(flight, FRAME_s, CONTROL_NAMES, [model.home], "model")
     reads = {term: read for term in terms if (read := aircraft.reader(term)) is not None}
     commands = list(_commands())
     rows = []
     for done, command in enumerate(commands):
         if done % _FRAMES_SHOWN == 0:
-            report(f"flying {name}", done, len(commands))
+            report(f"flying {model.label}", done, len(commands))
         rows.append([read() for read in reads.values()])
         aircraft.step(command)
         if aircraft.trouble():
@@ -153,13 +152,14 @@ def _commands() -> Iterator[tuple[float, float, float]]:
             yield from itertools.repeat((size[0], size[1], size[2]), round(length_s / FRAME_s))
 
 
-def _flown_by_run(name: str, run: str, terms: Iterable[str]) -> tuple[Flight, Values]:
+def _flown_by_run(model: ModelFile, run: str, terms: Iterable[str]) -> tuple[Flight, Values]:
     """Return the trim of a run's first case, and each term's values over its flight."""
     manoeuvre = read_run(run)[0]
     flight = manoeuvre.rig.flight
-    if flight is None or flight.model != name:
-        flies = "has no aircraft" if flight is None else f"flies {flight.model}"
-        raise InputError(run, "rig", f"{flies}; give a run of {name}")
+    flown = None if flight is None else model_file(model.home / flight.main_file)
+    if flight is None or flown != model:
+        flies = "has no aircraft" if flown is None else f"flies {flown.label}"
+        raise InputError(run, "rig", f"{flies}; give a run of {model.label}")
     aircraft = make_airframe(manoeuvre)
     assert isinstance(aircraft, JSBSimAirframe)
     known = tuple(term for term in terms if aircraft.has(term))

@@ -50,17 +50,19 @@ class Survey(Sequence[Surveyed], Displayed, Tabular):
 def survey_models(
     names: Sequence[str] = (), workers: int = 0, progress: Progress | None = None
 ) -> Survey:
-    """Return what is found of some models, or of all that are here.
+    """Return what is found of some models, or of all that are known.
 
-    `workers` are processes, 0 for one a core. Raises InputError for a model that is not here.
+    `names` are models, their files, or folders of models. `workers` are processes, 0 for one a
+    core. Raises InputError for any other name.
     """
     chosen = chosen_models(names)
-    found: dict[str, Surveyed] = {}
+    found: list[Surveyed] = []
     # A survey keeps a core busy, and each process holds a model: more than the cores only cost.
     count = 1 if len(chosen) < 4 else min(cores(workers), cores(0), len(chosen))
     with executor(count) as pool:
-        for one in as_done(pool, survey, list(chosen.items()), 2 * count):
-            found[one.model] = one
+        for one in as_done(pool, survey, [(each,) for each in chosen], 2 * count):
+            found.append(one)
             if progress is not None:
                 progress(one.model, len(found), len(chosen))
-    return Survey(tuple(found[name] for name in chosen))
+    order = [each.label for each in chosen]
+    return Survey(tuple(sorted(found, key=lambda one: order.index(one.model))))

@@ -55,7 +55,7 @@ def test_plan_is_the_commands(tmp_path: Path) -> None:
 def test_models_are_the_commands(tmp_path: Path) -> None:
     found = coupled.models(["T37", "L17"])
     assert as_json(found.as_dict()) == told(tmp_path, "models", "T37", "L17")
-    with pytest.raises(coupled.InputError, match="no JSBSim model 'T73'"):
+    with pytest.raises(coupled.InputError, match="T73: is no JSBSim model"):
         coupled.models(["T73"])
 
 

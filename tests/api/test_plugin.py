@@ -104,6 +104,7 @@ def test_what_fails_shows_figure_bounds_margin_time_and_why(tmp_path: Path) -> N
         assert re.search(line, str(raised.value)), line
 
 
+@pytest.mark.slow
 def test_what_holds_passes_and_each_expectation_is_a_test(tmp_path: Path) -> None:
     project(tmp_path, 70.0)
     done = run_pytest(tmp_path, "-v", "--coupled-report", "failed.html")

@@ -24,6 +24,7 @@ print("loss", found.to_polars()["loss"].round(3).to_list())
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("guard", [False, True])
 def test_a_script_with_and_without_the_guard_sweeps(guard: bool, tmp_path: Path) -> None:
     body = CALL

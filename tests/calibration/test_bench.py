@@ -87,6 +87,7 @@ def test_one_gradient_at_every_pressure_cannot_be_benched() -> None:
         stations(read_rig(shipped_rigs()["737"]), "wheel", 3, 3)
 
 
+@pytest.mark.slow
 def test_the_bench_is_the_rig_that_flies() -> None:
     """A run at given pressures is the frame loop's on a rig without aircraft, to the last bit."""
     scenario = read_run("appendix-c")[0]

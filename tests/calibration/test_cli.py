@@ -39,6 +39,7 @@ def test_help_has_examples(folder: Path) -> None:
         assert "Examples" in done.stdout
 
 
+@pytest.mark.slow
 def test_the_commands_bench_and_calibrate_write_a_rig_that_calibrates_again(folder: Path) -> None:
     done = coupled(folder, "bench", "-o", "b.csv")
     assert done.returncode == 0, done.stderr

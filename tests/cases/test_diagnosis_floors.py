@@ -155,6 +155,7 @@ def rocking(record: Record, by_m: float) -> Record:
     return Record(record.channels, data)
 
 
+@pytest.mark.slow
 def test_a_healthy_record_says_what_the_rig_file_has_wrong() -> None:
     """The servo is another than the rig file's in both records: only the bend has changed."""
     found = beside_healthy(FILED)
@@ -163,6 +164,7 @@ def test_a_healthy_record_says_what_the_rig_file_has_wrong() -> None:
     assert effect.parameters[0].found == pytest.approx(CHANGED, rel=0.02)
 
 
+@pytest.mark.slow
 def test_a_healthy_record_that_misses_its_rig_hides_no_change() -> None:
     found = beside_healthy(MACHINE, 3e-4)
     assert found.verdict in ("ambiguous", "effect", "mostly")
@@ -213,6 +215,7 @@ def test_the_bend_of_the_bench_with_another_servo_is_found() -> None:
     assert "a record, with no servo" in found.summary
 
 
+@pytest.mark.slow
 def test_no_effect_is_stated_to_be_surer_than_was_measured() -> None:
     scored = json.loads((ROOT / "docs" / "blind-score.json").read_text(encoding="utf-8"))
     surest = [one for one in scored["probabilities"]["bins"] if one["stated"] >= 0.9]
@@ -246,6 +249,7 @@ class Mouse:
         """Nothing is open."""
 
 
+@pytest.mark.slow
 def test_a_live_flight_by_mouse_has_no_gap() -> None:
     """The hand's force comes in steps: what a smoother takes off that is no noise."""
     live = rig_live("report-column", 25.0)

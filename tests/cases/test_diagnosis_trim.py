@@ -109,6 +109,7 @@ def test_the_help_pages_example_runs_on_the_guides_record(tmp_path: Path, slow_7
     assert refused.stderr.startswith("error: 737.csv: --rig: is missing")
 
 
+@pytest.mark.slow
 def test_an_improved_rig_keeps_the_rig_files_trim(tmp_path: Path) -> None:
     case = read_run("pull-up-737")[0]
     write_record(api.fly(replace(case, rig=case.rig.changed(WORN))).record, tmp_path / "w.csv")

@@ -246,7 +246,7 @@ def test_what_a_killed_load_left_is_removed_by_the_next(tmp_path: Path) -> None:
         assert list(tmp_path.iterdir()) == [ours]
         ours.rmdir()
         part = ALTERATIONS[0].part
-        with loadable(packaged_models()["T37"], "T37", [part]) as folder:
+        with loadable(packaged_models()["T37"] / "T37" / "T37.xml", [part]) as folder:
             assert folder.parent == tmp_path
         assert list(tmp_path.iterdir()) == []
 
@@ -282,6 +282,7 @@ def test_a_data_frame_that_is_no_record_is_one_line(frame: pl.DataFrame, says: s
     assert says in str(caught.value)
 
 
+@pytest.mark.slow
 def test_a_diagnosis_of_a_data_frame_is_that_of_its_record() -> None:
     rig = bench()
     pressure = coupled.PressureProfile(time_s=[0.0], dynamic_pressure_Pa=[3000.0])

@@ -26,6 +26,7 @@ def shipped(name: str, **changes: Any) -> Rig:
 
 
 RICH: dict[str, Any] = {
+    "travel_push_m": 0.06,
     "loader.friction_N": 3.0,
     "loader.friction_stiffness_N_per_m": 2e4,
     "loader.modifying_lag_s": 0.01,
@@ -70,6 +71,8 @@ def test_a_number_may_change_where_the_laws_give_all_that_it_does() -> None:
         assert rich[key].include(1e-3), key
     for key in ("loader.delay_s", "loader.modifying_lag_s"):
         assert not rich[key].include(0.0), key
+    assert "travel_push_m" not in plain
+    assert not rich["travel_push_m"].include(0.0)
     # A contact's stiffness is that of friction: without friction there is none.
     assert not rich["loader.friction_N"].include(0.0)
     assert plain["loader.friction_N"].include(0.0)

@@ -23,7 +23,7 @@ from coupled.resources import aircraft_folder, shipped_rigs
 from coupled.rig.parameters import Flight
 from coupled.rig.rigfile import read_rig
 from coupled.schema import changed
-from coupled.surveying.survey import known_models
+from coupled.surveying.survey import chosen_model
 from tests.support.models import edited_model, multiplied
 
 FRAME = 1 / 120
@@ -56,7 +56,7 @@ class Neutral(Wrapper):
     @property
     def scaled(self) -> tuple[Part, ...]:
         parts = [alteration.part for alteration in ALTERATIONS]
-        term = next(iter(functions_of(known_models()[self._model], self._model)))
+        term = next(iter(functions_of(chosen_model(self._model).path)))
         return (Term(term), *(p for p in parts if (self._model, p.name) != ("737", "adverse_yaw")))
 
 

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import shutil
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 import numpy as np
 import pytest
 
 from coupled.errors import InputError
+from coupled.exporting.alone import fly_alone
+from coupled.exporting.write import Flown, export, put
 from coupled.flight.airframe import packaged_models
+from coupled.flight.loop import fly
+from coupled.flight.runfile import read_run
 from coupled.record.record import read_record
 from coupled.resources import shipped_rigs
 from coupled.rig.rigfile import read_rig
@@ -63,6 +67,32 @@ def test_a_folder_without_the_model_is_named(folder: Path) -> None:
     (folder / "mine.toml").write_text(text.replace('"models"', '"elsewhere"'))
     with pytest.raises(InputError, match=r"mine.toml: flight.model_folder: 'elsewhere' holds no"):
         read_rig(folder / "mine.toml")
+
+
+def test_a_variant_of_another_file_name_flies_and_is_exported_alone(folder: Path) -> None:
+    """The model's file has not the name of its folder; the export needs neither."""
+    own = folder / "models" / "MINE"
+    (own / "MINE.xml").rename(own / "late.xml")
+    file = folder / "mine.toml"
+    with pytest.raises(InputError, match=r"model_folder: 'models' holds no MINE/MINE.xml"):
+        read_rig(file)
+    file.write_text(file.read_text().replace('"MINE"\n', '"MINE"\nmodel_file = "late"\n'))
+    flown = {}
+    for name in ("mine.toml", "t37"):
+        (folder / "short.toml").write_text(RUN.replace("mine.toml", name))
+        (run,) = read_run(str(folder / "short.toml"))
+        flown[name] = fly(run)
+    np.testing.assert_array_equal(flown["mine.toml"].data, flown["t37"].data)
+    (folder / "short.toml").write_text(RUN)
+    (run,) = read_run(str(folder / "short.toml"))
+    made = export(run.rig, [Flown(run, ("compensated",))], file, check=False)
+    assert PurePosixPath("aircraft/MINE/MINE.xml") in made.files
+    put(made.files, folder / "alone")
+    shutil.rmtree(folder / "models")
+    (script,) = (folder / "alone" / "scripts").iterdir()
+    table, _ = fly_alone(folder / "alone", f"scripts/{script.name}", ["coupled/column/computed-m"])
+    compensated = flown["mine.toml"]["column_computed_m"]
+    assert table[:, 0].max() == pytest.approx(compensated.max(), rel=0.02)
 
 
 @pytest.mark.slow

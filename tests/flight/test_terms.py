@@ -23,9 +23,10 @@ from coupled.flight.modelfile import loadable
 from coupled.flight.modelparts import NothingToScaleError, Part, Term
 from coupled.flight.modeltext import functions_of
 from coupled.flight.runfile import read_run
+from coupled.resources import shipped_rigs
 from coupled.rig.parameters import Flight
 from coupled.schema import build
-from coupled.surveying.survey import known_models
+from coupled.surveying.survey import chosen_model, known_models
 from tests.support.commands import coupled as command
 from tests.support.models import edited_model, multiplied
 
@@ -139,6 +140,26 @@ def test_the_shares_are_those_of_a_given_run(tmp_path: Path) -> None:
         assert found[term].share == pytest.approx(sizes[term] / sum(sizes.values()))
 
 
+def test_the_terms_of_a_variant_are_those_of_its_file(tmp_path: Path) -> None:
+    edited_model(tmp_path, "c172p", multiplied({"/Clp": 0.702}))
+    variant = tmp_path / "c172p" / "late.xml"
+    (tmp_path / "c172p" / "c172p.xml").rename(variant)
+    own = 'model = "c172p"\nmodel_folder = "."\nmodel_file = "late"\n'
+    text = shipped_rigs()["c172p"].read_text("utf-8").replace('model = "c172p"\n', own)
+    (tmp_path / "late.toml").write_text(text)
+    (tmp_path / "pull.toml").write_text(
+        'name = "pull"\ncard = "a pull"\nrig = "late.toml"\nduration_s = 0.2\n'
+        '[pilot.column]\nkind = "step"\nforce_N = 2\n'
+    )
+    found = coupled.terms(variant, run=tmp_path / "pull.toml")
+    assert found.model == "c172p/late"
+    assert CLP in {one.term for one in found}
+    with pytest.raises(InputError, match="rig: flies c172p/late; give a run of c172p"):
+        coupled.terms("c172p", run=tmp_path / "pull.toml")
+    with pytest.raises(InputError, match="rig: flies T37; give a run of c172p/late"):
+        coupled.terms(variant, run="pull-up-t37")
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
@@ -161,15 +182,15 @@ def test_wrong_requests_are_refused(tmp_path: Path, words: tuple[str, ...], said
 @pytest.mark.parametrize("model", sorted(set(known_models()) - {"blank"}))
 def test_every_model_loads_with_all_its_parts_and_terms_scalable(model: str) -> None:
     """A term that JSBSim shows no property of has no share; ballx alone has one."""
-    home, parts = known_models()[model], list[Part]()
-    functions = functions_of(home, model)
+    main, parts = chosen_model(model).path, list[Part]()
+    functions = functions_of(main)
     for part in (*map(Term, functions), *(alteration.part for alteration in ALTERATIONS)):
-        with suppress(NothingToScaleError), loadable(home, model, [part]):
+        with suppress(NothingToScaleError), loadable(main, [part]):
             parts.append(part)
     assert len(parts) > len(functions)
     fdm = jsbsim.FGFDMExec(jsbsim.get_default_root_dir())
     fdm.set_dt(FRAME)
-    with loadable(home, model, parts, 8) as folder:
+    with loadable(main, parts, 8) as folder:
         fdm.set_aircraft_path(str(folder))
         assert fdm.load_model(model)
     known = {line.rpartition(" (")[0] for line in fdm.query_property_catalog("").split("\n")}

@@ -116,6 +116,7 @@ def test_a_floor_that_an_effect_raises_is_of_its_own_power() -> None:
     assert (named, unexplained, left) == pytest.approx((0.8, 0.1, 0.1))
 
 
+@pytest.mark.slow
 def test_a_cause_is_as_large_everywhere_and_what_to_set_is_said(tmp_path: Path) -> None:
     nominal = nominal_rig(False)
     record = made(tmp_path, nominal, {"bend": {"bend_{d}_per_N": 1.6e-4}}, 4).between(0.0, 20.0)

@@ -130,6 +130,7 @@ def test_two_healthy_records_show_no_change_of_a_tenth() -> None:
     assert compared(WELL[:1], [screw(60, friction=3.0)]).changed == ()
 
 
+@pytest.mark.slow
 def test_a_diagnosis_against_healthy_records_names_the_stage_that_changed(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -49,6 +49,7 @@ def test_the_order_of_channels_changes_nothing(worn: Record) -> None:
     assert one == other
 
 
+@pytest.mark.slow
 def test_the_order_of_records_changes_nothing(worn: Record) -> None:
     halves = {"a": worn.between(0.0, 12.0), "b": worn.between(12.0, 24.0)}
     first, half = play_of(diagnose(RIG, halves))
@@ -57,6 +58,7 @@ def test_the_order_of_records_changes_nothing(worn: Record) -> None:
     assert other == pytest.approx(half, rel=0.1)
 
 
+@pytest.mark.slow
 def test_a_record_cut_in_two_gives_the_same_answer(worn: Record) -> None:
     value, half = play_of(diagnose(RIG, {"r": worn}))
     cut = {"a": worn.between(0.0, 12.0), "b": worn.between(12.0, 24.0)}
@@ -65,12 +67,14 @@ def test_a_record_cut_in_two_gives_the_same_answer(worn: Record) -> None:
     assert abs(value - PLAY_m) < half
 
 
+@pytest.mark.slow
 def test_more_of_the_same_data_narrows_an_interval(worn: Record) -> None:
     """Beside the model error of 1.5 % of the change, which no data narrow."""
     short, whole = (play_of(diagnose(RIG, {"r": worn.between(0.0, s)}))[1] for s in (8.0, 24.0))
     assert whole < short
 
 
+@pytest.mark.slow
 def test_a_control_by_another_name_has_the_same_answer(worn: Record) -> None:
     pedals = {**BENCH["controls"]["column"], "surface": "rudder"}
     rig = rig_from_table({**BENCH, "frame_rate_Hz": 120.0, "controls": {"pedals": pedals}}, "bench")
@@ -79,6 +83,7 @@ def test_a_control_by_another_name_has_the_same_answer(worn: Record) -> None:
     assert play_of(found) == pytest.approx(play_of(diagnose(RIG, {"r": worn})), rel=1e-6)
 
 
+@pytest.mark.slow
 def test_an_irrelevant_effect_in_the_library_changes_no_answer(worn: Record) -> None:
     """Its number is one of the surface, which a bench does not have."""
     prepared = prepare(RIG, {"r": worn})

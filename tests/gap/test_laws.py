@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import pytest
 
-from coupled.flight.airframe import JSBSimAirframe, packaged_models
+from coupled.flight.airframe import JSBSimAirframe
 from coupled.gap.diagnose import diagnose
 from coupled.gap.effects.effect import apply
 from coupled.gap.effects.library import BY_NAME
@@ -21,7 +21,7 @@ from coupled.resources import shipped_rigs
 from coupled.rig.rig import Rig
 from coupled.rig.rigfile import read_rig
 from coupled.surveying.draft import draft
-from coupled.surveying.survey import survey
+from coupled.surveying.survey import chosen_model, survey
 from tests.support.gaps import pushes
 from tests.support.records import NOISE
 
@@ -29,7 +29,7 @@ from tests.support.records import NOISE
 @pytest.fixture(scope="module")
 def falcon(tmp_path_factory: pytest.TempPathFactory) -> Rig:
     file = tmp_path_factory.mktemp("f16") / "f16.toml"
-    found = survey("f16", packaged_models()["f16"], speeds=True)
+    found = survey(chosen_model("f16"), speeds=True)
     file.write_text(draft(found, "f16"), encoding="utf-8")
     rig = read_rig(file)
     return rig.changed({"controls": {"column": rig.controls["column"]}})

@@ -209,6 +209,7 @@ def swept(*words: tuple[float, Request]) -> LiveFlight:
     return fly_live(manoeuvre, Plan(paced=False, watchers=[Switcher(*words)]))
 
 
+@pytest.mark.slow
 def test_a_host_that_was_switched_in_flight_has_no_gap() -> None:
     flight = swept(
         (4.0, Request("set", "deflection", "column", 0.0)),

@@ -131,6 +131,7 @@ def test_what_one_speed_cannot_tell_is_said_with_the_test_that_would(tmp_path: P
     assert several.verdict == "effect"
 
 
+@pytest.mark.slow
 def test_the_summary_names_size_certainty_and_share(tmp_path: Path) -> None:
     nominal = nominal_rig(False)
     record = made(tmp_path, nominal, {"coulomb_friction": {"friction_N": 2.0}}, 4)

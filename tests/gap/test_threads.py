@@ -25,6 +25,7 @@ def record(tmp_path_factory: pytest.TempPathFactory) -> Record:
     return gaps.made(tmp_path_factory.mktemp("made"), RIG, {"bend": {"bend_{d}_per_N": 1e-4}}, 3)
 
 
+@pytest.mark.slow
 def test_two_threads_give_the_answer_of_one_to_the_bit(record: Record) -> None:
     short = record.between(0.0, 12.0)
     one, two = (diagnose(RIG, {"r": short}, workers=n).as_dict() for n in (1, 2))

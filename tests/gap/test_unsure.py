@@ -89,6 +89,7 @@ def test_a_colour_that_was_heard_too_low_is_no_gap(plain: dict[str, Record], see
     assert 1.3 < loader["settled"] < loader["limit"]
 
 
+@pytest.mark.slow
 def test_once_there_is_a_gap_what_is_left_of_it_is_held_to_noise(plain: dict[str, Record]) -> None:
     found = diagnose(gaps.nominal_rig(False), {"r": noisy(plain["rubs"], 8)})
     loader = found.as_dict()["stages"]["loader"]

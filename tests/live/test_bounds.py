@@ -50,6 +50,7 @@ def closed(wire: socket.socket, within_s: float) -> bool:
         return True
 
 
+@pytest.mark.slow
 def test_connections_are_bounded_and_a_slow_one_is_not_waited_for(page: Any) -> None:
     wires = [socket.create_connection(place(page)) for _ in range(server.MOST_CONNECTIONS + 30)]
     for wire in wires:

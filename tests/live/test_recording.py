@@ -85,6 +85,7 @@ def full_after(size: int) -> Iterator[None]:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
+@pytest.mark.slow
 def test_a_full_disk_ends_the_recording_and_not_the_flight(tmp_path: Path) -> None:
     flown(tmp_path / "first.csv", 1.5)
     second_bytes = (tmp_path / "first.csv").stat().st_size

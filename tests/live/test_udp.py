@@ -182,6 +182,7 @@ def test_a_loader_outputs_no_force_when_the_host_is_silent() -> None:
     loader.close()
 
 
+@pytest.mark.slow
 def test_a_loader_in_another_process_is_flown_and_its_k_found() -> None:
     with fake_loader("udp") as (port, _):
         record = fly_with(port, 12.0).record

@@ -10,11 +10,12 @@ from pathlib import Path
 import pytest
 
 from coupled.authority.compare import fly_and_judge
+from coupled.errors import InputError
 from coupled.flight.manoeuvre import Manoeuvre
 from coupled.flight.pilot import Step
 from coupled.rig.rigfile import read_rig
 from coupled.surveying.draft import draft, kind_of
-from coupled.surveying.survey import Surveyed, known_models, survey
+from coupled.surveying.survey import Surveyed, chosen_model, chosen_models, known_models, survey
 from tests.support.commands import coupled, files
 
 MODELS = known_models()
@@ -22,7 +23,7 @@ SECTIONS = ("loader", "schedule", "compensation")
 
 
 def test_a_model_that_trims_is_found_with_its_controls_and_rigs() -> None:
-    found = survey("T37", MODELS["T37"], speeds=True)
+    found = survey(chosen_model("T37"), speeds=True)
     assert found.flight is not None
     assert found.holds
     assert found.controls == ("column", "wheel", "pedals")
@@ -34,19 +35,19 @@ def test_a_model_that_trims_is_found_with_its_controls_and_rigs() -> None:
     assert found.fastest > 150.0
 
 
-def test_a_model_that_does_not_trim_has_jsbsims_own_reason() -> None:
-    lacking = survey("L17", MODELS["L17"])
+def test_a_model_that_does_not_trim_has_the_reason() -> None:
+    lacking = survey(chosen_model("L17"))
     assert lacking.flight is None
-    assert "fcs/flaps-pos-deg does not exist" in lacking.why
-    glider = survey("minisgs", MODELS["minisgs"])
-    assert "udot doesn't appear to be trimmable" in glider.why
+    assert "JSBSim does not create, as FlightGear does: fcs/flaps-pos-deg" in lacking.why
+    glider = survey(chosen_model("minisgs"))
+    assert "m/s² backwards remain with no more thrust from the throttle" in glider.why
 
 
 def test_a_law_of_the_models_own_is_told_from_direct_controls() -> None:
-    found = survey("f16", MODELS["f16"])
+    found = survey(chosen_model("f16"))
     assert found.controls
     assert not found.direct
-    mixed = survey("A320", MODELS["A320"])
+    mixed = survey(chosen_model("A320"))
     assert mixed.controls == ("column", "wheel")
     assert mixed.lacking[0].startswith("pedals: moves its rudder by more than the command")
 
@@ -66,11 +67,11 @@ def fly_first_rig(found: Surveyed, folder: Path) -> None:
 
 
 def test_a_first_rig_flies(tmp_path: Path) -> None:
-    fly_first_rig(survey("F80C", MODELS["F80C"], speeds=True), tmp_path)
+    fly_first_rig(survey(chosen_model("F80C"), speeds=True), tmp_path)
 
 
 def test_every_guess_of_a_first_rig_is_listed_as_one(tmp_path: Path) -> None:
-    found = survey("J3Cub", MODELS["J3Cub"])
+    found = survey(chosen_model("J3Cub"), speeds=True)
     text = draft(found, "cub")
     assert kind_of(found.mass_kg).name in text
     file = tmp_path / "cub.toml"
@@ -97,7 +98,7 @@ def test_the_command_lists_models_and_writes_a_rig(tmp_path: Path) -> None:
     first, second = json.loads((tmp_path / "models.json").read_text())
     assert first["trims"]
     assert first["rigs"] == ["report-column", "t37"]
-    assert "does not exist" in second["why_not"]
+    assert "does not create" in second["why_not"]
     done = coupled(tmp_path, "new", "rig", "OV10", "first.toml")
     assert done.returncode == 0, done.stderr
     assert read_rig(tmp_path / "first.toml").flight is not None
@@ -113,13 +114,51 @@ def test_a_rig_is_written_for_the_folder_of_a_model(tmp_path: Path) -> None:
     assert 'model_folder = "."' in text
 
 
+@pytest.fixture
+def variants(tmp_path: Path) -> Path:
+    """Return a folder of two models; one has two main files, neither with its folder's name."""
+    folder = tmp_path / "hangar"
+    shutil.copytree(MODELS["J3Cub"] / "J3Cub", folder / "J3Cub")
+    shutil.copytree(MODELS["T37"] / "T37", folder / "Tweet")
+    (folder / "Tweet" / "T37.xml").rename(folder / "Tweet" / "t37a.xml")
+    shutil.copyfile(folder / "Tweet" / "t37a.xml", folder / "Tweet" / "t37b.xml")
+    return folder
+
+
+def test_a_folder_of_models_is_listed_with_variants(variants: Path) -> None:
+    labels = ["J3Cub", "Tweet/t37a", "Tweet/t37b"]
+    assert [each.label for each in chosen_models([str(variants)])] == labels
+    assert all(each.own and each.path.is_file() for each in chosen_models([str(variants)]))
+    with pytest.raises(InputError, match=r"holds 2 models; name the file of one: Tweet/t37a"):
+        chosen_model(str(variants / "Tweet"))
+    packaged = chosen_model("f22/yf22")
+    assert not packaged.own
+    assert packaged.path.name == "yf22.xml"
+    done = coupled(variants, "models", "Tweet", "--json", "-", columns=200)
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert [(one["model"], one["trims"], one["rigs"]) for one in found] == [
+        ("Tweet/t37a", True, []),
+        ("Tweet/t37b", True, []),
+    ]
+
+
+def test_a_rig_is_written_for_the_file_of_a_variant(variants: Path) -> None:
+    done = coupled(variants, "new", "rig", "Tweet/t37b.xml")
+    assert done.returncode == 0, done.stderr
+    flight = read_rig(variants / "t37b.toml").flight
+    assert flight is not None
+    assert (flight.model, flight.model_file) == ("Tweet", "t37b")
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
         (("new", "rig", "T73"), "no JSBSim model"),
-        (("new", "rig", "L17"), "fcs/flaps-pos-deg does not exist"),
+        (("new", "rig", "L17"), "FlightGear does: fcs/flaps-pos-deg"),
         (("new", "rig", "T37", "rig.txt"), "ends in .toml"),
-        (("models", "T73"), "there is no JSBSim model 'T73'"),
+        (("models", "T73"), "T73: is no JSBSim model and no folder of one"),
+        (("models", "."), "is no JSBSim model and no folder of one"),
     ],
 )
 def test_a_model_that_cannot_be_surveyed_is_refused_in_one_line(
@@ -136,7 +175,7 @@ def test_a_model_that_cannot_be_surveyed_is_refused_in_one_line(
 def test_every_packaged_model_that_jsbsim_trims_flies_with_a_first_rig(
     model: str, tmp_path: Path
 ) -> None:
-    found = survey(model, MODELS[model], speeds=True)
+    found = survey(chosen_model(model), speeds=True)
     if found.flight is None:
         assert found.why
     elif found.controls:

@@ -20,6 +20,7 @@ from tests.support.rigs import bench
 STAGES = controls.STAGES
 # What is no number of the kernels: said of the host, the airframe or a calibration.
 ELSEWHERE = {"gains", "calibration", "tolerance", "guesses"}
+ELSEWHERE |= {"command_property", "surface_property"}  # of the airframe
 RECORDERS = {("sensing", "force_stamp")}  # tests/rig/test_recorder.py
 BY_ANOTHER = {("loader", "crosstalk")}  # tests/rig/test_crosstalk.py
 # Everything on, so that each number counts: two segments, converters, an arc.
@@ -27,6 +28,8 @@ SCHEDULE, HOST, SENSING = (f"controls.column.{s}" for s in ("schedule", "compens
 RIG = bench(
     {
         "controls.column.guesses": ["loader.mass_kg"],
+        "controls.column.command_property": ["fcs/stabilator-cmd-norm"],
+        "controls.column.surface_property": ["fcs/stabilator-pos-rad"],
         "arc_geometry": True,
         "bend_push_m_per_N": 1e-4,
         "breakaway_N": 1.0,

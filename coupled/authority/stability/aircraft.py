@@ -149,7 +149,7 @@ def _response(rig: Rig, file: Path) -> Callable[[float], Response]:
 def _loop(linear: Rig, response: Response, rate: float) -> complex:
     """Return P at a frequency: load factor over one N per g of bob weight, broken at the force."""
     column, frame_s = linear.controls["column"], 1.0 / linear.frame_rate
-    gain = COMMAND_SIGN["elevator"] / column.travel
+    gain = COMMAND_SIGN["elevator"] * 0.5 * (1.0 / column.pull + 1.0 / column.push)
     return gain * _loader(linear, rate, frame_s) * response.load_factor
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 # By section and field of the rig (`rig/parameters`).
 PARAMETERS: dict[str, str] = {
     "travel": "travel of the control to either side of neutral",
+    "travel_pull": "travel on the positive side",
+    "travel_push": "travel on the negative side",
     "length": "length of the arc on which the grip moves",
     "loader.mass": "mass of the computed control (on a wheel N per rad/s²)",
     "loader.damping": "viscous damping of the computed control",

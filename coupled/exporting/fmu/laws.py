@@ -8,7 +8,7 @@ file as it is. The laws of the others are listed here, so that an FMU computes t
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 from coupled.rig.compiled import entry, stage
 from coupled.rig.control import STAGES
@@ -84,8 +84,10 @@ def laws(control: Control, frame_s: float, substep_s: float) -> dict[str, Law]:
         "linkage.width": _same("loader.bend_hysteresis_width"),
         "linkage.contact": _same("loader.play_stiffness"),
         "linkage.delay_substeps": _same("loader.servo_delay", 1.0 / substep_s),
-        "services.travel": _same("travel"),
-        "surface.gain": _inverse("travel", COMMAND_SIGN[control.surface]),
+        "services.pull": _same(_side(control, "pull")),
+        "services.push": _same(_side(control, "push")),
+        "surface.gain": _inverse(_side(control, "pull"), COMMAND_SIGN[control.surface]),
+        "surface.gain_push": _inverse(_side(control, "push"), COMMAND_SIGN[control.surface]),
         "surface.stretch": _same("rigging.stretch_loss"),
         "surface.lag_gain": Law(GAIN, frame_s, ("rigging.lag",)),
         "surface.rate_step": _same("rigging.rate_limit", frame_s),
@@ -93,6 +95,11 @@ def laws(control: Control, frame_s: float, substep_s: float) -> dict[str, Law]:
     if control.loader.arc_geometry:
         found["linkage.arc_length"] = _same("length")
     return {f"parameters.{place}": law for place, law in found.items()} | _of_state(control)
+
+
+def _side(control: Control, side: Literal["pull", "push"]) -> str:
+    """Return the field with the travel of a side: its own, or that of both sides."""
+    return f"travel_{side}" if getattr(control, f"travel_{side}") else "travel"
 
 
 def _unchanged(control: Control) -> dict[str, Law]:
@@ -166,8 +173,8 @@ def _of_loader(control: Control, h: float) -> dict[str, Law]:
         "loader.relaxing_time": _same("loader.relaxing_time"),
         "loader.delay_substeps": _same("loader.delay", 1.0 / h),
         "loader.travel": _same("travel"),
-        "loader.aft": Law(STOP, 1.0, ("travel", "loader.stop_aft")),
-        "loader.forward": Law(STOP, 1.0, ("travel", "loader.stop_forward")),
+        "loader.aft": Law(STOP, 1.0, (_side(control, "pull"), "loader.stop_aft")),
+        "loader.forward": Law(STOP, 1.0, (_side(control, "push"), "loader.stop_forward")),
         "gauge.mass": _same("sensing.gauge_mass"),
         "gauge.delay_substeps": _same("sensing.gauge_delay", 1.0 / h),
         "gauge.samples": _same("sensing.gauge_sampling", h),

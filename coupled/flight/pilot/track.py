@@ -227,7 +227,10 @@ class Track(Pilot):
         arm = (stiffness + damping * s + self.arm_mass_kg * s**2) * follows
         late = np.exp(-s * (0.5 * frame_s + loader.delay))  # the command is held over a frame
         # The host takes δc, before the servo, which only affects the arm.
-        drive: complex = COMMAND_SIGN[control.surface] / control.travel
+        # About neutral: the mean of both sides' gains.
+        drive: complex = (
+            COMMAND_SIGN[control.surface] * 0.5 * (1.0 / control.pull + 1.0 / control.push)
+        )
         drive /= (1.0 + rigging.stretch_loss * pressure_Pa) * (1.0 + rigging.lag * s)
         return complex(drive * late / ((1.0 + self.lag_s * s) * (feel + arm)))
 

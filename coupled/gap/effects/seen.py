@@ -124,15 +124,16 @@ def stops(outputs: Sequence[Output], rig: Rig, control: ControlName) -> list[dic
     A stop is met where the nominal rig goes beyond every measured place. There the control rests
     at it, and the median of what is measured is the stop. A side that is not met has the travel.
     """
-    travel = rig.controls[control].travel
+    travels = (rig.controls[control].pull, rig.controls[control].push)
     names = [channel(control, quantity) for quantity in ("computed", "deflection")]
     ours = [o for o in outputs if o.stage == "loader" and o.channel in names]
     found: dict[str, float] = {}
-    for name, side in (("aft_{d}", 1.0), ("forward_{d}", -1.0)):
+    sides = (("aft_{d}", 1.0), ("forward_{d}", -1.0))
+    for (name, side), travel in zip(sides, travels, strict=True):
         places = [_met(output, rig, side) for output in ours]
         met = [place for place in places if place is not None]
         found[name] = min([*met, travel])
-    return [found] if ours and min(found.values()) < travel else []
+    return [found] if ours and tuple(found.values()) != travels else []
 
 
 def _met(output: Output, rig: Rig, side: float) -> float | None:

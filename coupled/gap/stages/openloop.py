@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from coupled.flight.aircraft import make_aircraft
 from coupled.flight.airframe import JSBSimAirframe
+from coupled.flight.altered import STILL
 from coupled.flight.everyframe import PROPERTIES
 from coupled.flight.gusts import Gusts
 from coupled.flight.wrapper import Wrapper
@@ -104,7 +105,7 @@ def fly_open_loop(
     controls), which the surface positions include. Raises InputError if the model cannot be
     trimmed.
     """
-    still = changed(flight, {"gust_rms_m_per_s": 0.0}, "rig", "flight")
+    still = changed(flight, STILL, "rig", "flight")
     frame_s = 1.0 / frame_rate_Hz
     gusts = Gusts(still, frame_s, air_m_per_s=air_m_per_s)
     with _flying:

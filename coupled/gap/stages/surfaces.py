@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from coupled.flight.aircraft import make_aircraft
 from coupled.flight.airframe import JSBSimAirframe
-from coupled.flight.altered import UNALTERED
+from coupled.flight.altered import STILL, UNALTERED
 from coupled.gap.noise.smooth import Smoother, smoothed
 from coupled.gap.signals.conditions import trim_shift
 from coupled.gap.signals.floors import left_noise
@@ -108,7 +108,7 @@ def filed_trim(rig: Rig, control: ControlName) -> float:
 def own_trim(rig: Rig, control: ControlName) -> float:
     """Return a surface's position in the trim of the rig's own aircraft, rad."""
     assert rig.flight is not None
-    still = changed(rig.flight, {"gust_rms_m_per_s": 0.0}, rig.name, "flight")
+    still = changed(rig.flight, STILL, rig.name, "flight")
     controls = tuple(rig.controls)
     return _trim(still.model_dump_json(), controls, rig.frame_rate)[controls.index(control)]
 

@@ -237,7 +237,8 @@ def bind(address: str, port: int) -> socket.socket:
     """Return a listening socket; raises OSError."""
     family = socket.AF_INET6 if ":" in address else socket.AF_INET
     wire = socket.socket(family, socket.SOCK_STREAM)
-    wire.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    if os.name == "posix":  # on Windows it would share a port that another server has
+        wire.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     wire.bind((address, port))
     wire.listen(64)  # before the address is published
     return wire

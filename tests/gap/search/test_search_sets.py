@@ -51,12 +51,14 @@ def test_a_known_effect_is_found_at_its_size(
     assert number.low <= value <= number.high
 
 
+@pytest.mark.slow
 def test_two_effects_of_two_stages_are_found_together(tmp_path: Path) -> None:
     both = {"bend": {"bend_{d}_per_N": 1.6e-4}, "inertia": {"factor": 1.4}}
     found = answer(tmp_path, both, 5)
     assert {effect.name for effect in found.effects} == set(both)
 
 
+@pytest.mark.slow
 def test_beside_an_effect_without_a_number_another_stage_is_explained_too(tmp_path: Path) -> None:
     servo = nominal_rig(False).changed({"controls.column.loader.servo_frequency_Hz": 12.0})
     both = {"no_servo": {}, "inertia": {"factor": 1.4}}
