@@ -23,7 +23,13 @@ from coupled.files import read_text, toml_tables
 class Section(BaseModel):
     """A table of a file, frozen."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, strict=True)
+    model_config = ConfigDict(
+        frozen=True,
+        extra="forbid",
+        allow_inf_nan=False,
+        strict=True,
+        protected_namespaces=(),  # pydantic 2.9 keeps all names that begin with model_
+    )
 
 
 class Given(Section):
