@@ -36,7 +36,8 @@ from coupled.plots.trials import draw_score
 from coupled.tables.trials import score_table
 from tests.support.commands import ROOT
 
-SCORED = "the version of 25 November 2026"  # whose diagnoses the file scores
+# Whose diagnoses the file scores.
+SCORED = "the version of 25 November 2026 (the search was replaced since and is not scored yet)"
 SINCE = "No threshold was tuned on these records, and they were scored once."
 JSON, FIGURE = ROOT / "docs" / "blind-score.json", ROOT / "docs" / "blind-score.png"
 README, TABLE = ROOT / "README.md", ROOT / "docs" / "scores.md"
