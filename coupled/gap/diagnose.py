@@ -74,7 +74,7 @@ def findings(prepared: Prepared, case: Case, choice: Choice) -> Diagnosis:
     fitted = Problem(case).fit(found.effects, found.values, descent=own, part="fitted")
     floors = floors_of(case, choice)
     budgets = [
-        stage_budget(stage.name, case, choice.settled, choice.fit, floors)
+        stage_budget(stage.name, case, choice.without_effects, choice.fit, floors)
         for stage in stages
         if stage.guilty
     ]

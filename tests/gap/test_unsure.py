@@ -28,7 +28,7 @@ def force(rng: np.random.Generator) -> np.ndarray:
 
 
 @cache
-def heard(memory: float) -> list[tuple[float, float]]:
+def estimated_power(memory: float) -> list[tuple[float, float]]:
     """Return of 40 samples what is heard of the power at low frequencies, over the true, and how
     much more there may be."""
     true, found = Noise(0.15, memory), []
@@ -47,13 +47,13 @@ def slow(noise: Noise) -> float:
 
 @pytest.mark.parametrize("memory", [0.0, 0.25, 0.4, 0.6])
 def test_the_true_power_is_within_what_may_be(memory: float) -> None:
-    assert min(share * (1.0 + unsure) for share, unsure in heard(memory)) > 0.85
+    assert min(share * (1.0 + unsure) for share, unsure in estimated_power(memory)) > 0.85
     if memory:
-        assert min(share for share, _ in heard(memory)) < 0.8  # what is heard alone
+        assert min(share for share, _ in estimated_power(memory)) < 0.8  # what is heard alone
 
 
 def test_of_white_noise_little_is_unsure() -> None:
-    assert np.median([unsure for _, unsure in heard(0.0)]) < 0.05
+    assert np.median([unsure for _, unsure in estimated_power(0.0)]) < 0.05
 
 
 @pytest.fixture(scope="module")
