@@ -125,7 +125,7 @@ TRIM_s = 1.0  # chosen: from a record's start, over which the trim is measured
 TRIM_SIGMAS = 4.0  # chosen: of its noise, above which a record's trim differs from the model's
 TRIM_STILL = 0.25  # chosen: of the difference, the largest earlier motion by a command
 TRIM_ANSWERED = 13.8  # χ² of two parameters, exceeded by chance in 1 of 1000
-# Flown to decide whether a surface that stands off is in trim, by TRIM_LAGS_s: on 26 records of a
+# Flown to decide whether an offset of a surface is a trim, by TRIM_LAGS_s: on 26 records of a
 TRIM_FLIGHT_s = 15.0  # T-37 with one fault or two; longer, the phugoid's own error decided
 TRIM_LAGS_s = (0.0, 0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 1.0, 1.3, 1.7, 2.2, 3.0, 4.0)  # chosen
 TRIM_SINCE = 4.0  # chosen: least gain, twice the log-likelihood, for a motion since then
@@ -261,14 +261,14 @@ SETTING_NUDGE = 0.5  # chosen: of a setting's tolerance, at which its signature 
 
 # The next test (`proposal`), and the flight again (`flown`).
 TEST_s, TEST_EDGE_s = 15.0, 0.25  # chosen: of a test, and in which a hand begins or ends a push
-SEPARATED_GAIN = 10.0  # chosen: log-likelihood that settles which of two it is
+SEPARATED_GAIN = 10.0  # chosen: log-likelihood gain that discriminates two effects
 SAME_FLIGHT = 0.01  # chosen: of the mean logarithm, by which an improved rig may fly further off
 PROFILE_EVERY = 12  # chosen: frames between the points of a bench's q̄
 
 IN_FLIGHT_LEAST = 0.01  # chosen: of a channel's motion, from which an effect shows in flight
 
-# What the summary says (`summary`).
-FREE_LEAST = 5  # chosen: %, under which a model free in form explains nothing
+# The summary (`summary`).
+FREE_LEAST = 5  # chosen: %, below which a model free in form explains nothing
 
 # Whether an effect is the cause (`credibility`).
 # Set on 68 effects found in blind records of seeds 101 to 103 and 301: none of 53 right ones drifts
@@ -281,11 +281,11 @@ HOST_DRIFT = 0.04  # in the schedule, which is exact: of 15 right effects of see
 # drifts by over 0.001, and a lag read for a hysteresis by 0.08 and 0.53
 # And on three made ones: Coulomb friction for one that yields by 0.2, 0.5 mm takes 0.99 and 0.89,
 # viscous damping for one by the square of the speed 0.65; of 13 wrong ones eleven take under 0.5.
-FLEXIBLE_LEFT = 0.75  # share of what a free model leaves, which an effect must take beside it,
-# or else leave no more than that model does alone
-UNPROVEN = 0.25  # chosen: error of a size in its best halves, from which none is shown the same
-LEAST_OF_A_HALF = 0.1  # chosen: of an effect's action, that a half must hold to have a size
-LEAST_HOLD = 2.0  # chosen: stretches that hold a half's action, under which its size has no error
+FLEXIBLE_LEFT = 0.75  # least share of a free model's residual that an effect explains,
+# unless its residual is no larger than that of the free model
+UNPROVEN = 0.25  # chosen: error of a size in its best halves, above which stationarity is not shown
+LEAST_OF_A_HALF = 0.1  # chosen: least share of an effect's action in a half with a size
+LEAST_HOLD = 2.0  # chosen: least effective stretches of a half for an error of its size
 
 # The search over sets of effects (`beam`).
 BEAM_WIDTH, BEAM_DEPTH = 6, 4  # sets that are extended, and largest depth

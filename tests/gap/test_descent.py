@@ -23,11 +23,11 @@ RIG = gaps.nominal_rig(False)
 
 
 def straight(scaled: Floats, coarse: bool = False, rough: bool = False) -> Floats:
-    """Return a linear residual; by wide steps, one whose least is elsewhere."""
+    """Return a linear residual; with coarse steps, one whose least is elsewhere."""
     return LAW @ scaled - SAID + (0.3 * LAW[:, 0] if coarse else 0.0)
 
 
-def test_a_fit_ends_at_the_least_by_own_steps_and_not_by_wide_ones() -> None:
+def test_a_fit_ends_at_the_least_by_own_steps_and_not_by_coarse_ones() -> None:
     least = np.linalg.lstsq(LAW, SAID, rcond=None)[0]
     begin = [np.array([1.0, 1.0])]
     assert np.allclose(Descent().end(straight, begin, ENDS, stepped=True).x, least, atol=SURE)
@@ -100,7 +100,7 @@ def test_what_is_left_is_noise_up_to_a_tenth_more() -> None:
     assert not leaves_noise(0.5 * 1.11**2 * 1000, 1000)
 
 
-def test_wide_steps_are_those_of_the_loader_alone_and_only_where_asked_for() -> None:
+def test_coarse_steps_are_those_of_the_loader_alone_and_only_where_asked_for() -> None:
     coarse = coarsely_stepped(RIG)
     assert coarse.substeps == COARSE_STEPS_Hz / RIG.frame_rate < RIG.substeps
     assert coarse.controls == RIG.controls
@@ -119,6 +119,6 @@ def test_wide_steps_are_those_of_the_loader_alone_and_only_where_asked_for() -> 
     assert seen == [RIG.substeps, coarse.substeps, RIG.substeps]
 
 
-def test_a_widely_stepped_rig_can_be_changed_as_any_other() -> None:
+def test_a_coarsely_stepped_rig_can_be_changed_as_any_other() -> None:
     key = "controls.column.loader.friction_N"
     assert coarsely_stepped(RIG).changed({key: 2.0}) == coarsely_stepped(RIG.changed({key: 2.0}))

@@ -14,7 +14,7 @@ from coupled.gap.stages.surfaces import surface_points
 from tests.support.gaps import made, nominal_rig
 
 
-def test_an_echo_is_taken_off_and_nothing_else() -> None:
+def test_only_the_projection_on_a_signal_is_removed() -> None:
     rng = np.random.default_rng(1)
     own, echo = rng.normal(0.0, 1.0, (2, 20_000))
     for share in (0.0, 1.0, -1.0):

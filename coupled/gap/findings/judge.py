@@ -77,8 +77,8 @@ class Judge:
             name = stage.name
             result: StageResult | None
             if name in before and name not in lacking:
-                wide = left[name] > explained_below(root[name], limits[name])
-                faulty = name in self.blamed or wide
+                unexplained = left[name] > explained_below(root[name], limits[name])
+                faulty = name in self.blamed or unexplained
                 hidden = None if faulty else self._hidden(name)
                 if hidden is not None:
                     found += [StageResult(name, why=hidden.words, hidden=hidden)]

@@ -154,7 +154,7 @@ def _under_set_points(
 def _reached(grip: Floats, record: Record) -> float:
     """Return the speed in d/s that the grip surely reached, over a few frames, beyond its noise.
 
-    A play only makes it slower than the servo; a bend would add to it, but has no say here.
+    A play only makes it slower than the servo; a bend would add to it, but is not considered.
     """
     rate_Hz = (len(grip) - 1) / float(record.time_s[-1] - record.time_s[0])
     noise = REACHED_BEYOND * estimate_noise(grip).rms
