@@ -170,7 +170,7 @@ def made_by(job: Job) -> dict[str, str]:
 
 
 def known_row(job: Job, made: Mapping[str, str]) -> Row | None:
-    """Return the line of a diagnosis that stands there already, made by just this.
+    """Return the row of an existing diagnosis that was made with the same inputs and version.
 
     None where there is none, and where the file is damaged: the diagnosis is then made again.
     """

@@ -1,7 +1,7 @@
-"""The stages of the signal chain as a diagnosis knows them: listed here, and nowhere else.
+"""The stages of the signal chain in a diagnosis, defined in this module alone.
 
-The order is that of the chain; tables, figures and JSON follow it. What a stage is driven by, and
-its replay, is in `stages` and `airframe`.
+Tables, figures and JSON list the stages in the order of the chain. The inputs and predictions of
+the stages are in `stages` and `airframe`.
 """
 
 from __future__ import annotations
@@ -11,13 +11,13 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Stage:
-    """One stage: the outputs that judge it, and how figures show it.
+    """One stage: the outputs that judge it, and its display in figures.
 
-    `outputs` are those that its gap is taken over. `effects_show_in` are those in which an effect
-    of it shows, unless the effect says otherwise. A stage without outputs of its own shows only
-    in those of its neighbours. `flown`: to replay it is to fly the aircraft, so a size is not
-    scanned. `drive` is the quantity of the control, or the channel, that drives it, by its symbol.
-    `color` is one of Okabe and Ito's.
+    The gap of a stage is taken over its `outputs`. An effect of the stage shows in the outputs
+    `effects_show_in`, unless the effect has outputs of its own. A stage without outputs shows only
+    in those of its neighbours. If `flown`, a prediction is a flight of the aircraft, and sizes are
+    not scanned. `drive` is the symbol and name of the quantity or channel that drives the stage.
+    `color` is of the palette of Okabe and Ito.
     """
 
     name: str
@@ -49,5 +49,5 @@ STAGES = tuple(BY_NAME)
 
 
 def stage_of(output: str) -> str:
-    """Return the stage that an output judges: F_mod, the multiplier's, is the loader's."""
+    """Return the stage of an output; the output `multiplier`, F_mod, is of the loader."""
     return next((stage.name for stage in CHAIN if output in stage.outputs), output)

@@ -1,4 +1,4 @@
-"""What is checked before a record is held against a rig: clock, numbers, sensors, units."""
+"""Checks of a record before its diagnosis: clock, values, sensors, units."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ START_ROWS = 12  # chosen: a tenth of a second at 120 Hz, before a pilot has cha
 
 
 def check_record(rig: Rig, record: Record, control: ControlName, file: object) -> None:
-    """Refuse a record that cannot be held against this rig, and say why."""
+    """Check that a record can be of a rig. Raises InputError with the reason if it cannot."""
     if control not in rig.controls:
         raise InputError(file, control, f"the rig has no {control}")
     if rig.controls[control].schedule.deflection is not None:
@@ -52,7 +52,7 @@ def check_record(rig: Rig, record: Record, control: ControlName, file: object) -
 
 
 def _check_channels(rig: Rig, record: Record, control: ControlName, file: object) -> None:
-    """Refuse a channel that is stuck, a copy of another, or in another unit."""
+    """Raise InputError if a channel is stuck, a copy of another, or in another unit."""
     names = [channel(control, q) for q in ("force", "computed", "deflection")]
     present = [name for name in names if name in record]
     for i, name in enumerate(present):
@@ -78,7 +78,7 @@ def _check_channels(rig: Rig, record: Record, control: ControlName, file: object
 
 
 def _why_constant(rig: Rig, record: Record, control: ControlName) -> str:
-    """Return what may keep a channel of a control constant: no push, or a stuck sensor."""
+    """Return the possible cause of a constant channel: no motion, or a stuck sensor."""
     force = channel(control, "force")
     if force not in record:
         return f"the {control} is at rest, or a sensor is stuck"
@@ -96,7 +96,7 @@ def _why_constant(rig: Rig, record: Record, control: ControlName) -> str:
 
 
 def _check_schedule(rig: Rig, record: Record, control: ControlName, file: object) -> None:
-    """Refuse a record whose gradients are none that this rig's table could give."""
+    """Raise InputError if the gradients differ from those of the rig's table."""
     gradient, pressure = channel(control, "gradient"), "dynamic_pressure_Pa"
     if gradient not in record or pressure not in record:
         return
@@ -111,7 +111,7 @@ def _check_schedule(rig: Rig, record: Record, control: ControlName, file: object
 
 
 def check_trim(trim_speed_m_per_s: float, record: Record, file: object) -> None:
-    """Refuse a record that does not start at the speed where the rig's aircraft is trimmed."""
+    """Raise InputError if a record does not start at the trim speed of the rig's aircraft."""
     if SPEED not in record:
         return
     start = start_of(record, SPEED)
@@ -122,12 +122,12 @@ def check_trim(trim_speed_m_per_s: float, record: Record, file: object) -> None:
 
 
 def start_of(record: Record, name: str) -> float:
-    """Return where a channel stands at the start of a record, in its unit."""
+    """Return the value of a channel at the start of a record, in its unit."""
     return float(np.median(record[name][:START_ROWS]))
 
 
 def _check_force_unit(rig: Rig, record: Record, control: ControlName, file: object) -> None:
-    """Refuse a force whose size against gradient and deflection is that of pounds."""
+    """Raise InputError if the force, by gradient and deflection, is in pounds."""
     names = [channel(control, q) for q in ("force", "computed", "gradient")]
     if any(name not in record for name in names):
         return

@@ -1,13 +1,13 @@
 """A diagnosis: where the gap lies, which effects cause it, how far it shrinks.
 
-    prepare    how the machine is driven, where it trims, what can be judged (`prepare`)
+    prepare    the drive, the trim, and the outputs that can be judged (`prepare`)
     search     the sets of effects with the largest evidence (`beam`)
-    findings   the verdict, each effect's probability and interval, and what else may be the cause
+    findings   the verdict, each effect's probability and interval, and the alternatives
 
-The verdict is `no_gap` where every stage stays within its noise floor, `effect` where the residual
-with the effects found is noise, `mostly` where they are certain and hold most of the gap,
-`ambiguous` where the record does not distinguish them from others, and `unexplained` where nothing
-that is credible holds half of it.
+The verdict is `no_gap` if every stage is within its noise floor, `effect` if the residual with the
+effects found is noise, `mostly` if the effects are certain and explain most of the gap, `ambiguous`
+if the data do not discriminate them from others, and `unexplained` if no credible effects explain
+half of the gap.
 """
 
 from __future__ import annotations
@@ -46,10 +46,10 @@ def diagnose(
 ) -> Diagnosis:
     """Return the diagnosis of records of one rig, by their files' names.
 
-    `tell` is called with what is being done, and how much of how much is done. With records of the
-    machine when it was well (`healthy`), the difference from those is judged (`healthy`). So many
-    threads work as `workers`, 0 being one a core; the answer is that of one. Raises
-    InputError where a record cannot be of this rig, or lets no stage be judged.
+    `tell` is called with the present task, and the numbers of tasks done and in all. With records
+    of the `healthy` machine, the change since then is judged. `workers` is the number of threads, 0
+    for one per core; the result does not depend on it. Raises InputError if a record cannot be of
+    this rig, or if no stage can be judged.
     """
     with threads(workers):
         baseline = None
@@ -62,7 +62,7 @@ def diagnose(
 
 
 def findings(prepared: Prepared, case: Case, choice: Choice) -> Diagnosis:
-    """Return the answer that a search of prepared records gives; `case` has its last floors."""
+    """Return the diagnosis from a search; `case` has the final noise floors."""
     rig, control, readers = case.nominal, case.control, prepared.readers
     outputs = list(case.outputs)
     judge = Judge(readers, outputs, choice, case.gaps(choice.fit.rig))
@@ -74,7 +74,7 @@ def findings(prepared: Prepared, case: Case, choice: Choice) -> Diagnosis:
     fitted = Problem(case).fit(found.effects, found.values, descent=own, part="fitted")
     floors = floors_of(case, choice)
     budgets = [
-        stage_budget(stage.name, case, choice.settled, choice.fit, floors)
+        stage_budget(stage.name, case, choice.without_effects, choice.fit, floors)
         for stage in stages
         if stage.guilty
     ]

@@ -1,9 +1,9 @@
-"""A nominal rig from records of a healthy machine: what its numbers are, and how well known.
+"""Fit a nominal rig to records of a healthy machine, with intervals of its parameters.
 
-The freed numbers are fitted by the stages' own physics, driven by what was measured, as effects
-are (`fit`). How well they are known is the scatter of the score from stretch to stretch, or of the
-numbers from record to record where that is more. Numbers that act alike in these records are not
-distinguished: a friction and a damping where all motion has one speed are one number.
+The free parameters are fitted like effects (`fit`), with the stages driven by the measured inputs.
+Their intervals follow from the scatter of the score between stretches, or from the scatter of the
+values between records if that is larger. Parameters with nearly proportional signatures are not
+identifiable: for example friction and damping, if all motion has one speed.
 """
 
 from __future__ import annotations
@@ -47,12 +47,12 @@ def fit_nominal(
     control: ControlName = "column",
     tell: Tell | None = None,
 ) -> NominalFit:
-    """Return a rig with the numbers of some keys fitted to records of it, by their files' names.
+    """Return a rig with the parameters of some keys fitted to records, by their files' names.
 
-    A key is one of the control's in a rig file, as `loader.mass_kg`; without any, the usual ones of
-    the stages that the records judge. The rig's `tolerance` holds half of each one's 95 % interval.
-    A number that the records do not determine stays as filed, its tolerance too.
-    Raises InputError where a record is of another rig, or no record depends on a key.
+    A key is one of the control in a rig file, such as `loader.mass_kg`; the default is the usual
+    keys of the stages that the records can judge. The rig's `tolerance` is half of each 95 %
+    interval. A parameter that the records do not determine keeps its value and tolerance.
+    Raises InputError if a record is of another rig, or if no record depends on a key.
     """
     rig = as_driven(rig, list(records.values()), control) if control in rig.controls else rig
     for file, record in records.items():
@@ -70,7 +70,7 @@ def fit_nominal(
     for key in chosen:
         asked = freed(rig, control, key)
         shown = as_judged([asked], readers, outputs)
-        effects += [_begun(effect, outputs, rig, control) for effect in shown]
+        effects += [_with_starts(effect, outputs, rig, control) for effect in shown]
         if not touched(outputs, shown):
             lacking = sorted({n for r in readers for n in r.missing().get(asked.stage, [])})
             needs = ", ".join(lacking) or f"what judges the {asked.stage}"
@@ -82,7 +82,7 @@ def fit_nominal(
     scales = Scales.of(readers)
     groups = fits.whole.groups
     while (worst := _least_determined(numbers, rig, control, effects, scales)) is not None:
-        # It stays as filed, and the others are fitted beside that.
+        # It keeps its value in the file, and the others are fitted again.
         one = numbers[worst]
         numbers[worst] = replace(one, found=one.filed, half=None, at_bound=False)
         effects = [effect for effect in effects if effect.name != worst]
@@ -92,7 +92,7 @@ def fit_nominal(
     found = tuple(numbers.values())
     used = [output for output in outputs if output.stage in shown_in]
     files = list(records)
-    known = _known(rig, control, found)
+    known = _with_fitted(rig, control, found)
     fitted = {one.key for one in found if one.half is not None}
     doubts = _doubts_of_servo(known, control, fitted, held.rig, used)
     return NominalFit(
@@ -107,7 +107,7 @@ def fit_nominal(
 
 @dataclass(frozen=True)
 class _Fits:
-    """Fits of the same numbers: to every other stretch, to all, and to each record alone."""
+    """Fits of the same parameters: to every other stretch, to all, and to each record alone."""
 
     effects: Sequence[Effect]
     held: Fit
@@ -115,7 +115,7 @@ class _Fits:
     each: Sequence[Fit]
 
     def numbers(self, rig: Rig, control: ControlName) -> list[Number]:
-        """Return the numbers as fitted to all."""
+        """Return the parameters as fitted to all records."""
         return [_number(rig, control, one, self.whole, self.each) for one in self.effects]
 
 
@@ -126,13 +126,13 @@ def _fitted(
     effects: Sequence[Effect],
     tell: Tell | None,
 ) -> _Fits:
-    """Return the fits of numbers to every other stretch, to all, and to each record alone."""
+    """Return the fits to every other stretch, to all, and to each record alone."""
     records = len({output.record for output in outputs})
     _tell(tell, "fitting", 0, records + 2)
     held = fit_alone(rig, control, outputs, effects, part="fitted")
     _tell(tell, "fitting to all", 1, records + 2)
     whole = fit_alone(rig, control, outputs, effects, held.values)
-    return _Fits(effects, held, whole, _each(rig, control, outputs, effects, whole, tell))
+    return _Fits(effects, held, whole, _fits_by_record(rig, control, outputs, effects, whole, tell))
 
 
 def _least_determined(
@@ -142,11 +142,11 @@ def _least_determined(
     effects: Sequence[Effect],
     scales: Scales | None,
 ) -> str | None:
-    """Return the key of the fitted number that the records determine least; None: all are.
+    """Return the key of the least determined parameter; None if all are determined.
 
-    A number is not determined if half of its interval is more than the number, filed and found. Of
-    a number filed as 0, half of the interval is also more than `FLOOR_SHARE` of its scale in these
-    records: a change by that would be plain.
+    A parameter is not determined if half of its interval exceeds its filed and its fitted value. If
+    the filed value is 0, half of the interval must also exceed `FLOOR_SHARE` of its scale in these
+    records.
     """
     loose = {}
     for effect in effects:
@@ -163,10 +163,10 @@ def _least_determined(
 def _doubts_of_servo(
     found: Rig, control: ControlName, fitted: Set[str], held: Rig, used: Sequence[Output]
 ) -> tuple[str, ...]:
-    """Return why a servo as fitted is none: its damping, or that the records need no servo.
+    """Return the reasons against a fitted servo: low damping, or no better prediction with it.
 
-    `held` is the rig fitted to the stretches that are not held out. A servo whose numbers were not
-    fitted is not doubted.
+    `held` is the rig fitted to the stretches that are not held out. A servo that was not fitted is
+    not judged.
     """
     loader = found.controls[control].loader
     keys = {"loader.servo_frequency_Hz", "loader.servo_damping_ratio"}
@@ -179,7 +179,7 @@ def _doubts_of_servo(
         )
     none = _without_servo(held, control)
     if none is not None:
-        with_servo, without = (_left(used, rig) for rig in (held, none))
+        with_servo, without = (_held_out_rms(used, rig) for rig in (held, none))
         if without <= with_servo * (1.0 + SERVO_NEEDED):
             reasons.append("without a servo the held-out stretches are predicted as well")
     if not reasons:
@@ -193,21 +193,23 @@ def _doubts_of_servo(
 
 
 def _without_servo(rig: Rig, control: ControlName) -> Rig | None:
-    """Return a rig without its servo; None where it has what only a servo has."""
+    """Return a rig without its servo; None if it has other parameters of a servo."""
     try:
         return rig.changed({f"controls.{control}.loader.servo_frequency_Hz": 0.0})
     except InputError:
         return None
 
 
-def _left(used: Sequence[Output], rig: Rig) -> float:
-    """Return the rms of all residuals on stretches held out, in floors."""
+def _held_out_rms(used: Sequence[Output], rig: Rig) -> float:
+    """Return the rms of all residuals on the held-out stretches, in noise floors."""
     left = np.concatenate([output.residual(rig, "held") for output in used])
     return float(np.sqrt(np.mean(left**2)))
 
 
-def _begun(effect: Effect, outputs: Sequence[Output], rig: Rig, control: ControlName) -> Effect:
-    """Return a freed number that a fit begins where the records show it, if they do."""
+def _with_starts(
+    effect: Effect, outputs: Sequence[Output], rig: Rig, control: ControlName
+) -> Effect:
+    """Return a free parameter with starts estimated from the residuals, if there are any."""
     seen = [] if effect.seen is None else effect.seen(outputs, rig, control)
     (number,) = effect.free
     starts = tuple(one[number.name] for one in seen)
@@ -227,7 +229,7 @@ def _outputs(readers: Sequence[Reader]) -> list[Output]:
     return found
 
 
-def _each(
+def _fits_by_record(
     rig: Rig,
     control: ControlName,
     outputs: Sequence[Output],
@@ -235,7 +237,7 @@ def _each(
     whole: Fit,
     tell: Tell | None,
 ) -> list[Fit]:
-    """Return a fit to each record alone; none where there is one record."""
+    """Return a fit to each record alone; none for a single record."""
     records = sorted({output.record for output in outputs})
     found = []
     for i, record in enumerate(records if len(records) > 1 else []):
@@ -252,7 +254,7 @@ def _number(
     whole: Fit,
     each: Sequence[Fit],
 ) -> Number:
-    """Return a number with the wider of its interval and its scatter from record to record."""
+    """Return a parameter with the wider of its interval and its scatter between records."""
     (parameter,) = effect.free
     name = effect.value_key(parameter)
     found, half = whole.values[name], 0.5 * (whole.high[name] - whole.low[name])
@@ -260,16 +262,16 @@ def _number(
         scatter = float(np.std([one.values[name] for one in each], ddof=1))
         half = max(half, 2.0 * scatter)
     if abs(found - parameter.low) < 1e-6 * parameter.starts[0]:
-        found = parameter.low  # the fit stays by a hair within its bounds
+        found = parameter.low  # a fit at its bound stays slightly inside
     filed = float(parameter.nominal(rig, control))
     known = half if math.isfinite(half) else None
     return Number(effect.name, filed, found, known, parameter.low, name in whole.at_bound)
 
 
-def _known(rig: Rig, control: ControlName, numbers: Sequence[Number]) -> Rig:
-    """Return the rig with the numbers found, and how well they are known.
+def _with_fitted(rig: Rig, control: ControlName, numbers: Sequence[Number]) -> Rig:
+    """Return the rig with the fitted values and their tolerances.
 
-    What the host assumes of the loader stays as filed: it made the records with that.
+    The values that the host assumes of the loader do not change, since the records contain them.
     """
     data = rig.controls[control]
     changes: dict[str, Any] = {}
@@ -288,7 +290,7 @@ def _known(rig: Rig, control: ControlName, numbers: Sequence[Number]) -> Rig:
 
 
 def _channel(output: Output, before: Rig, after: Rig, file: str) -> ChannelFit:
-    """Return how far a channel stays from its prediction on held-out stretches."""
+    """Return the error of a channel's prediction on held-out stretches."""
     rms = [float(np.sqrt(np.mean(output.residual(r, "held") ** 2))) for r in (before, after)]
     return ChannelFit(
         file,

@@ -1,4 +1,4 @@
-"""What a fit of a nominal rig found, as data; each result makes its own part of the JSON."""
+"""The results of a fit of a nominal rig, and their JSON."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Number:
-    """A fitted number: as filed, as found, and half of its 95 % interval; None: undetermined.
+    """A fitted parameter: value in the file, fitted value, and half of its 95 % interval.
 
-    `least` is the smallest that it may be.
+    `half` is None if the parameter is undetermined. `least` is the lower bound.
     """
 
     key: str
@@ -31,7 +31,7 @@ class Number:
 
     @property
     def interval(self) -> tuple[float, float] | None:
-        """The 95 % interval, within what the number may be; None where nothing determines it."""
+        """The 95 % interval, cut at the lower bound; None if undetermined."""
         if self.half is None:
             return None
         return max(self.found - self.half, self.least), self.found + self.half
@@ -45,9 +45,10 @@ class Number:
 
 @dataclass(frozen=True)
 class ChannelFit:
-    """How far a channel's prediction stays from it, rms in its unit, on stretches held out.
+    """The prediction error of a channel on held-out stretches, rms in its unit.
 
-    `floor` is what noise alone leaves, `moves` the standard deviation of the channel.
+    `before` is the error with the rig file, `after` with the fitted rig, `floor` the noise floor,
+    and `moves` the standard deviation of the channel.
     """
 
     file: str
@@ -71,14 +72,14 @@ class ChannelFit:
 
 @dataclass(frozen=True)
 class NominalFit(TableResult):
-    """A nominal rig fitted to records: its numbers, and what the records do not tell of them."""
+    """A nominal rig fitted to records: its parameters, and which of them are not identifiable."""
 
     control: ControlName
     rig: Rig
     numbers: tuple[Number, ...]
     alike: tuple[Alike, ...]
     channels: tuple[ChannelFit, ...]
-    doubts: tuple[str, ...] = ()  # what was found and cannot be a machine's, a sentence each
+    doubts: tuple[str, ...] = ()  # reasons against fitted values, a sentence each
 
     def __repr__(self) -> str:
         doubts = f", {len(self.doubts)} doubts" if self.doubts else ""
@@ -87,12 +88,12 @@ class NominalFit(TableResult):
         return f"NominalFit({self.rig.name}, {self.control}: {of}{doubts})"
 
     def to_polars(self) -> pl.DataFrame:
-        """Return a row a number: its key, as filed and as found, and its 95 % interval."""
+        """Return a row per parameter: key, filed and fitted value, and 95 % interval."""
         return frame_of([{"key": one.key} | one.as_dict() for one in self.numbers])
 
     @property
     def unknown(self) -> tuple[str, ...]:
-        """The keys of numbers on which the records do not depend."""
+        """The keys of undetermined parameters."""
         return tuple(number.key for number in self.numbers if number.half is None)
 
     def as_dict(self) -> dict[str, Any]:

@@ -1,7 +1,7 @@
-"""Prepare records for a diagnosis: how the machine is driven, where it trims, what can be judged.
+"""Prepare records for a diagnosis: the drive, the trim, the outputs and the effects to try.
 
-Everything that depends on the records alone is decided here, once: the rig as it was driven and
-trimmed, the outputs of its stages with their noise floors, and the effects that can be tried.
+All that depends on the records alone is determined once: the rig with the records' drive and trim,
+the outputs of its stages with their noise floors, and the effects that can be tried.
 """
 
 from __future__ import annotations
@@ -35,11 +35,11 @@ from coupled.rig.rig import Rig
 
 @dataclass(frozen=True)
 class Prepared:
-    """Records of one control of a rig, ready to be searched for effects.
+    """Prepared records of one control of a rig.
 
     `case` holds the rig and the outputs, `library` the effects that can be tried. `trim` and
-    `left_out` are sentences: what was taken from the records' trim, and what of live records is not
-    judged. `baseline` is the healthy machine, where its records were given.
+    `left_out` are sentences for the report: the trim that was taken from the records, and the parts
+    of live records that are not judged. `baseline` is the healthy machine, if it is known.
     """
 
     case: Case
@@ -60,8 +60,8 @@ def prepare(
 ) -> Prepared:
     """Return records prepared for a diagnosis, by their files' names.
 
-    With a `baseline`, the rig is that of the healthy machine, and its error raises the noise
-    floors. Raises InputError where a record cannot be of this rig, or lets no stage be judged.
+    With a `baseline`, the rig is that of the healthy machine, and its model error raises the noise
+    floors. Raises InputError if a record cannot be of this rig, or if no stage can be judged.
     """
     if baseline is not None:
         rig = baseline.rig
@@ -82,7 +82,7 @@ def prepare(
         raise InputError(next(iter(records)), "", _too_little(rig, control, judged.readers))
     library = tried_effects(library_of(rig, control), judged.readers, outputs)
     return Prepared(
-        Case(rig, control, outputs, tell, judged.under, only_wide=baseline is not None),
+        Case(rig, control, outputs, tell, judged.under, model_error_in_floors=baseline is not None),
         tuple(library),
         tuple(judged.readers),
         records,
@@ -93,17 +93,17 @@ def prepare(
 
 
 def readers_of(rig: Rig, records: Mapping[str, Record], control: ControlName) -> list[Reader]:
-    """Return what builds the outputs of each record, in their order."""
+    """Return the reader of each record, which makes its outputs."""
     each = enumerate(records.values())
     return [Reader(rig, record, control, surface_points, number) for number, record in each]
 
 
 @dataclass(frozen=True)
 class Judged:
-    """The outputs that records let judge, by the rig that their noise floors are estimated with.
+    """The outputs that can be judged, with noise floors estimated with a given rig.
 
-    Where the surfaces and the aircraft stay as they are, the airframe's are not flown again. The
-    outputs of the last rigs are kept: each takes as long again.
+    The outputs of the last rigs are cached. If rigging and aircraft do not change, the airframe is
+    not flown again.
     """
 
     rig: Rig
@@ -114,7 +114,7 @@ class Judged:
     _known: list[tuple[Rig, list[Output]]] = field(default_factory=list, repr=False, compare=False)
 
     def under(self, rig: Rig) -> list[Output]:
-        """Return the outputs with the noise floors that a rig has."""
+        """Return the outputs with noise floors estimated with a rig."""
         known = next((made for other, made in self._known if other == rig), None)
         if known is None:
             known = self._made(rig)
@@ -124,7 +124,7 @@ class Judged:
     def _made(self, rig: Rig) -> list[Output]:
         readers = [replace(reader, rig=rig) for reader in self.readers]
         makers: list[Callable[[], list[Output]]] = [reader.outputs for reader in readers]
-        alike = bool(self._known) and _fly_alike(self.rig, rig)
+        alike = bool(self._known) and _has_same_flight(self.rig, rig)
         for one in () if alike else readers:
             flights = self._flights.setdefault(one.number, Flights())
             makers.append(partial(airframe_outputs, one.rig, one.record, one.number, flights))
@@ -136,7 +136,7 @@ class Judged:
         return made if self.baseline is None else self.baseline.raised(made)
 
 
-def _fly_alike(one: Rig, other: Rig) -> bool:
+def _has_same_flight(one: Rig, other: Rig) -> bool:
     """Tell whether two rigs' surfaces and aircraft are the same."""
     rigged = all(
         one.controls[name].rigging == other.controls[name].rigging for name in one.controls
@@ -145,7 +145,7 @@ def _fly_alike(one: Rig, other: Rig) -> bool:
 
 
 def _too_little(rig: Rig, control: ControlName, readers: Sequence[Reader]) -> str:
-    """Return what records lack of which no stage can be judged, in words."""
+    """Return the message that records lack the channels of every stage."""
     lacking = {
         name
         for reader in readers

@@ -1,8 +1,8 @@
-"""The rig and the trim of a record: from the manifest beside it, else from its first rows.
+"""The rig and the trim of a record: from its manifest, otherwise from its first rows.
 
-A rig file describes a machine; its aircraft may be trimmed at any speed, altitude and flight path,
-and with any flaps. Those are conditions of the flight and no fault: they are taken from the record.
-What else the rig of a manifest differs in (a mass, a moment, a bend) stays as the rig file has it.
+A rig file describes a machine. The trim of its aircraft (speed, altitude, flight path, flaps) is a
+condition of the flight and no fault, so it is taken from the record. Other values of a manifest's
+rig (a mass, a moment, a bend) are not used.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from coupled.rig.rig import Rig
 from coupled.rig.rigfile import rig_from_table
 from coupled.schema import changed, file_keys
 
-# The keys of a rig's `flight` that say how a flight starts, and not what the aircraft is.
+# The keys of a rig's `flight` that define the initial trim, not the aircraft.
 TRIM_KEYS = (
     "altitude_m",
     "calibrated_airspeed_m_per_s",
@@ -37,9 +37,9 @@ _FIELDS = file_keys(Flight, "m")
 
 
 def rig_of_manifests(records: Mapping[str, Record]) -> Rig:
-    """Return the rig that the manifests beside some records hold, that of the first.
+    """Return the rig in the manifests of some records, from the first manifest.
 
-    Raises InputError where a record has no manifest with a rig, or one with other controls.
+    Raises InputError if a record has no manifest with a rig, or if the rigs differ.
     """
     found: Rig | None = None
     for file, record in records.items():
@@ -58,11 +58,11 @@ def rig_of_manifests(records: Mapping[str, Record]) -> Rig:
 
 
 def trimmed(rig: Rig, records: Mapping[str, Record]) -> tuple[Rig, str]:
-    """Return a rig whose aircraft is trimmed as the records begin, and what was taken, in words.
+    """Return a rig with the trim at the start of the records, and a sentence about the change.
 
-    The words are empty where the rig file's own trim is theirs, or where there is no aircraft.
-    Raises InputError where a manifest holds another aircraft, the records differ in their trim, or
-    the aircraft cannot be trimmed so.
+    The sentence is empty if the trim is that of the rig file, or if there is no aircraft. Raises
+    InputError if a manifest has another aircraft, if the records differ in their trim, or if the
+    aircraft cannot be trimmed at it.
     """
     if rig.flight is None:
         return rig, ""
@@ -85,7 +85,7 @@ def trimmed(rig: Rig, records: Mapping[str, Record]) -> tuple[Rig, str]:
 
 
 def _same(flight: Flight, key: str, value: Any) -> bool:
-    """Tell whether a rig file has a key as it was flown, to what an instrument would show."""
+    """Tell whether a value of the rig file equals the flown one, to a relative 1e-6."""
     filed = getattr(flight, _FIELDS[key])
     if isinstance(value, float) and isinstance(filed, float):
         return math.isclose(value, filed, rel_tol=1e-6, abs_tol=1e-9)
@@ -93,7 +93,7 @@ def _same(flight: Flight, key: str, value: Any) -> bool:
 
 
 def _change(flight: Flight, key: str, value: Any) -> str:
-    """Return what a key was and is, in words."""
+    """Return a text of the change of a key."""
     if key == "properties":
         return "properties of the model"
     before = getattr(flight, _FIELDS[key])
@@ -103,7 +103,7 @@ def _change(flight: Flight, key: str, value: Any) -> str:
 
 
 def _manifest_trim(flight: Flight, record: Record, file: str) -> dict[str, Any] | None:
-    """Return the trim that a record's manifest holds by the keys of a rig file; None without."""
+    """Return the trim in a record's manifest, by keys of a rig file; None if it has none."""
     table = record.manifest.get("rig")
     given = table.get("flight") if isinstance(table, Mapping) else None
     if not isinstance(given, Mapping):
@@ -115,7 +115,7 @@ def _manifest_trim(flight: Flight, record: Record, file: str) -> dict[str, Any] 
 
 
 def _measured_trim(rig: Rig, record: Record, file: str) -> dict[str, Any]:
-    """Return the trim with which a record begins; empty where it is the rig's own, or not known."""
+    """Return the measured trim at a record's start; empty if it is the rig's or not measured."""
     assert rig.flight is not None
     if SPEED not in record:
         return {}

@@ -12,7 +12,7 @@ from matplotlib.patches import FancyBboxPatch
 from coupled.gap.chain import STAGES
 from coupled.gap.findings.result import StageResult
 from coupled.gap.signals.output import Output
-from coupled.gap.thresholds import GUILTY_FROM
+from coupled.gap.thresholds import FAULTY_FROM
 from coupled.plots import gapview as look
 from coupled.plots.gapview import View, channel_shown
 
@@ -88,7 +88,7 @@ def _caption(found: StageResult | None) -> str:
         why = "channels lack" if found.missing else textwrap.fill(found.why, 14)
         return f"not judged:\n{why}"
     text = f"{found.gap:.3g} × floor"
-    limit = GUILTY_FROM if found.limit is None else found.limit
+    limit = FAULTY_FROM if found.limit is None else found.limit
     if not found.guilty and found.gap < limit:
         return f"{text}\nclear"
     better = found.left is not None and found.left < found.gap

@@ -18,7 +18,7 @@ from coupled.gap.search.case import Case
 from coupled.gap.signals.output import Floats, Output
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points
-from coupled.gap.thresholds import GUILTY_FROM
+from coupled.gap.thresholds import FAULTY_FROM
 from coupled.record.channels import CONTROL_NAMES
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
@@ -117,7 +117,7 @@ class View:
     def threshold(self, stage: str) -> float:
         """Return the gap up to which a stage counts as explained."""
         found = self.stages.get(stage)
-        return GUILTY_FROM if found is None else found.explained_below
+        return FAULTY_FROM if found is None else found.explained_below
 
     def suspects(self) -> list[Output]:
         """Return the outputs of guilty stages and of the effects found, widest gap first.
@@ -131,7 +131,7 @@ class View:
         ours = [output for output in every if stage_of(output.stage) in guilty] or [*every]
         known = [(max(o.gap(self.diagnosis.nominal), self._left(o)), o) for o in ours]
         known.sort(key=lambda pair: -pair[0])
-        wide = [output for gap, output in known if gap > GUILTY_FROM]
+        wide = [output for gap, output in known if gap > FAULTY_FROM]
         return wide or [output for _, output in known]
 
     def _left(self, output: Output) -> float:

@@ -9,7 +9,7 @@ import pytest
 
 from coupled.gap.search.contact import allowing_for_contact, contact_start
 from coupled.gap.signals.output import Output
-from coupled.gap.thresholds import GUILTY_FROM, MISMATCH
+from coupled.gap.thresholds import FAULTY_FROM, MISMATCH
 from tests.support.rigs import bench
 
 
@@ -51,4 +51,4 @@ def test_how_filed_friction_yields_is_known_as_well_as_an_effects_physics(
     rig = bench({f"{key}_N": friction_N, f"{key}_stiffness_N_per_m": stiffness_N_per_m})
     gap = Output(stage, "x", np.full(2400, 21.0), lambda rig: np.zeros(2400), 1.0, 120.0)
     found = allowing_for_contact(gap, rig, "column")
-    assert found.limit == pytest.approx(1.0 + 20.0 * MISMATCH if allowed else GUILTY_FROM)
+    assert found.limit == pytest.approx(1.0 + 20.0 * MISMATCH if allowed else FAULTY_FROM)

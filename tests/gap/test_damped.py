@@ -80,7 +80,7 @@ def test_among_jumps_a_fit_ends_after_few_steps_that_bring_nothing(jump: float) 
     )
     least = np.linalg.lstsq(law, noise, rcond=None)[0]
     assert found.x == pytest.approx(least, abs=0.03)
-    assert found.asked == len(asked) <= 9
+    assert found.evaluations == len(asked) <= 9
 
 
 def test_where_each_place_nearby_is_worse_three_steps_end_a_fit() -> None:
@@ -94,9 +94,9 @@ def test_where_each_place_nearby_is_worse_three_steps_end_a_fit() -> None:
     found = descend(
         residual, lambda x: np.vstack((law, [0.0, 0.0])), first, WIDE, 40, lambda _: 1e-12
     )
-    assert found.refused
+    assert found.rejected
     assert np.array_equal(found.x, first)
-    assert found.asked == 1 + 3
+    assert found.evaluations == 1 + 3
 
 
 @pytest.mark.parametrize("start", [0.3, 3.0])
@@ -126,7 +126,7 @@ def test_no_more_is_asked_than_allowed() -> None:
         most=4,
         enough=lambda _: 1e-9,
     )
-    assert found.asked == 4
+    assert found.evaluations == 4
 
 
 def test_a_number_that_does_nothing_stays_where_it_is() -> None:

@@ -135,9 +135,9 @@ def test_noise_that_a_lag_has_coloured_is_as_large_as_it_is(corner_Hz: float) ->
 def test_a_hum_is_no_noise_and_a_filtered_log_is_seen() -> None:
     motion, noise = 300.0 * smooth_motion(FRAMES), RNG.normal(size=FRAMES)
     hum = 7.0 * np.sin(2.0 * np.pi * 50.0 * np.arange(FRAMES) / RATE_Hz)
-    heard = noise_of(motion + noise + hum)
-    assert heard.rms == pytest.approx(1.0, rel=0.1)
-    assert not heard.filtered
+    found = noise_of(motion + noise + hum)
+    assert found.rms == pytest.approx(1.0, rel=0.1)
+    assert not found.filtered
     kernel = np.hanning(9)
     assert noise_of(np.convolve(motion + noise, kernel / kernel.sum(), "valid")).filtered
 
@@ -187,7 +187,7 @@ def test_a_late_force_may_have_reached_the_host_with_another_noise(tmp_path: Pat
 
     late = rig.changed({"controls.column.sensing.force_stamp_s": 0.03})
     moved = 0.056**2 + 0.448**2 + 0.672**2 + 0.064**2
-    force = Reader(rig, record, "column", surface_points).heard("force").rms
+    force = Reader(rig, record, "column", surface_points).channel_noise("force").rms
     host = (rig.controls["column"].compensation.bend * force) ** 2
     more = floor(late) ** 2 - floor(rig) ** 2
     assert more == pytest.approx((1.0 + moved) * host, rel=0.06)

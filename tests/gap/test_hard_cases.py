@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from coupled.gap.diagnose import diagnose
 from coupled.gap.signals.air import vertical_air
 from coupled.gap.signals.output import Output, white
-from coupled.gap.signals.shared import echoed
+from coupled.gap.signals.shared import share_from_source
 from coupled.gap.thresholds import CERTAIN, STRETCH_s
 from coupled.record.record import write_record
 from coupled.rig.rig import Rig
@@ -79,12 +79,12 @@ def test_noise_that_comes_late_or_filtered_is_known_again() -> None:
     slow = np.zeros(6000)
     for k in range(1, 6000):
         slow[k] = slow[k - 1] + 0.3 * (source[k] - slow[k - 1])
-    for heard in (source, late, slow):
-        share, rest = echoed(2.0 * heard + 0.05 * own, source)
+    for channel in (source, late, slow):
+        share, rest = share_from_source(2.0 * channel + 0.05 * own, source)
         assert share > 0.9
         assert rest == pytest.approx(0.05, rel=0.1)
-    assert echoed(own, source)[0] < 0.02
-    assert echoed(np.zeros(6000), source) == (0.0, 0.0)
+    assert share_from_source(own, source)[0] < 0.02
+    assert share_from_source(np.zeros(6000), source) == (0.0, 0.0)
 
 
 def test_a_lag_of_a_few_frames_is_told_by_the_noise_it_holds_back(tmp_path: Path) -> None:

@@ -8,21 +8,21 @@ import numpy as np
 import pytest
 
 from coupled.gap.diagnose import diagnose
-from coupled.gap.signals.floors import without_echo
+from coupled.gap.signals.floors import remove_projection
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points
 from tests.support.gaps import made, nominal_rig
 
 
-def test_an_echo_is_taken_off_and_nothing_else() -> None:
+def test_only_the_projection_on_a_signal_is_removed() -> None:
     rng = np.random.default_rng(1)
     own, echo = rng.normal(0.0, 1.0, (2, 20_000))
     for share in (0.0, 1.0, -1.0):
-        left = without_echo(own + share * echo, echo)
+        left = remove_projection(own + share * echo, echo)
         assert np.std(left) == pytest.approx(1.0, rel=0.02)
         assert abs(left @ echo) < 1e-6 * float(echo @ echo)
-    assert without_echo(own, None) is own
-    assert without_echo(own, 0.0 * echo) is own
+    assert remove_projection(own, None) is own
+    assert remove_projection(own, 0.0 * echo) is own
 
 
 def test_the_floor_of_a_digital_product_is_that_of_an_analog_one(tmp_path: Path) -> None:

@@ -37,8 +37,8 @@ def test_what_happens_now_and_then_is_no_noise(memory: float) -> None:
 
 
 @pytest.mark.parametrize("seed", [23, 48, 83])
-def test_colour_that_looks_white_far_above_its_corner_is_heard_whole(seed: int) -> None:
-    """Of 120 samples with a corner at 20 Hz these three were heard as 0.74 to 0.78 of their rms."""
+def test_colour_that_looks_white_far_above_its_corner_is_estimated_in_full(seed: int) -> None:
+    """Of 120 samples with a corner at 20 Hz three were estimated at 0.74 to 0.78 of their rms."""
     noise = Noise(1.0, math.exp(-2.0 * math.pi * 20.0 / RATE_Hz))
     found = quiet_noise(noise.sample(FRAMES, np.random.default_rng([20, seed])))
     assert found is not None
@@ -75,7 +75,7 @@ def test_a_line_and_a_short_or_silent_signal() -> None:
 
 
 @pytest.mark.parametrize("share", [0.2, 0.4, 0.7])
-def test_frames_that_are_not_judged_are_not_heard_as_silence(share: float) -> None:
+def test_frames_that_are_not_judged_do_not_lower_the_noise(share: float) -> None:
     """Half seconds here and there have no residual: noise alone leaves a gap of one floor."""
     rng = np.random.default_rng(6)
     judged = np.repeat(rng.random(FRAMES // 60) >= share, 60)

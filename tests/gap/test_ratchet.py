@@ -15,7 +15,7 @@ from coupled.gap.noise.resting import Rest
 from coupled.gap.search.fit import fit_alone
 from coupled.gap.signals import driven
 from coupled.gap.stages import ratchet
-from coupled.gap.stages.ratchet import unratcheted
+from coupled.gap.stages.ratchet import without_backlash_creep
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points
 from coupled.record.record import Record
@@ -93,7 +93,7 @@ def test_noise_of_a_held_force_walks_no_contact(
         # Slopes are taken without putting the walk back: a replay for three, and nearly the same.
         assert loader.rough is not None
         assert np.any(loader.rough(real) != loader.predict(real))
-        monkeypatch.setattr(ratchet, "PUSHED", (1e9, 2e9))  # all of it is put back, of both rigs
+        monkeypatch.setattr(ratchet, "CREEP_WORSE", (1e9, 2e9))  # remove all creep
         other = rig.changed({stiffness: 7.5 / 1.4e-4, "controls.column.loader.friction_N": 7.6})
         moved, roughly = (
             output_of(other) - output_of(real) for output_of in (loader.predict, loader.rough)
@@ -120,7 +120,7 @@ def test_a_push_that_noise_did_not_give_is_left(held: float, kept: float) -> Non
         more = (2.0**0.5 - 1.0) * abs(times)  # as much noise again pushes √2 times as far
         return np.asarray(real + (held + more) * pushed)
 
-    answer = unratcheted(rig, "column", at, measured)
+    answer = without_backlash_creep(rig, "column", at, measured)
     np.testing.assert_allclose(answer, real + (held - 1.0 + kept) * pushed, atol=1e-12)
 
 
@@ -128,4 +128,4 @@ def test_a_linkage_without_play_is_not_pushed() -> None:
     def at(rig: Rig, times: float) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
         return np.full(10, times)
 
-    assert np.all(unratcheted(bench(), "column", at, np.ones(10)) == 0.0)
+    assert np.all(without_backlash_creep(bench(), "column", at, np.ones(10)) == 0.0)

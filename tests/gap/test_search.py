@@ -39,7 +39,7 @@ def test_what_a_surface_stands_off_may_be_where_another_aircraft_trims(
     keys = {"flight": "flight.pitch_stiffness", "controls": "controls.column.loader.mass_kg"}
     other = rig.changed({keys[changed]: 1.17})
     standing, held = output("surface", 1.4), output("surface", 1.0)
-    case = Case(rig, "column", [standing], refloored=lambda one: [held])
+    case = Case(rig, "column", [standing], outputs_with_noise_of=lambda one: [held])
     assert case.gaps(other)["surface"] == pytest.approx(left, rel=0.05)
     assert case.gaps(rig)["surface"] == pytest.approx(1.4, rel=0.05)
 
@@ -51,10 +51,10 @@ def test_noise_is_the_least_that_a_rig_leaves(quiet: float, floor: float) -> Non
     first = replace(output("linkage", 2.0), smoothed=0.75**0.5)
     ours = math.hypot(quiet, 0.4)
     anew = replace(first, floor=ours, smoothed=0.4 / ours)
-    case = Case(rig, "column", [first], refloored=lambda other: [anew])
+    case = Case(rig, "column", [first], outputs_with_noise_of=lambda other: [anew])
     assert first.own == pytest.approx(0.5)
     assert anew.own == pytest.approx(quiet)
-    again = case.heard_anew(rig)
+    again = case.with_lower_noise(rig)
     assert (again or case).outputs[0].floor == pytest.approx(floor)
     assert again is None or again.gaps(rig)["linkage"] == pytest.approx(2.0 / floor, rel=0.05)
 

@@ -25,7 +25,7 @@ class Curved:
     def __init__(self) -> None:
         self.asked = 0
 
-    def __call__(self, scaled: Floats, wide: bool = False, rough: bool = False) -> Floats:
+    def __call__(self, scaled: Floats, coarse: bool = False, rough: bool = False) -> Floats:
         self.asked += 1
         made: Floats = LAW @ scaled + CURVED @ scaled**2 - SAID
         return made
@@ -38,7 +38,7 @@ class Curved:
 
 def test_a_smooth_fit_ends_where_the_gradient_is_none_with_the_slopes_of_there() -> None:
     begin, always = [np.array([1.0, 1.0])], Curved()
-    Descent("wide").end(always, begin, ENDS, stepped=True)  # as one that jumps: differences
+    Descent("coarse").end(always, begin, ENDS, stepped=True)  # as one that jumps: differences
     curved = Curved()
     found = Descent().end(curved, begin, ENDS, stepped=False)
     slopes = curved.jacobian(found.x)

@@ -44,8 +44,8 @@ def test_coloured_noise_is_not_kept_as_a_part_of_the_motion(memory: float) -> No
         read = true + noise.sample(len(true), np.random.default_rng(seed))
         wrong.append(np.std(smoothed(read, noise) - true))
         white.append(np.std(smoothed(read, Noise(0.01)) - true))
-        heard = smoothed(read)
-        assert np.std(heard - true) < 1.3 * wrong[-1]
+        estimated = smoothed(read)
+        assert np.std(estimated - true) < 1.3 * wrong[-1]
     assert np.mean(wrong) < 0.9 * np.mean(white)
 
 

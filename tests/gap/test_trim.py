@@ -186,13 +186,20 @@ def test_a_mass_is_fitted_where_the_model_soon_ceases_to_trim(tmp_path: Path, ri
         own_trim(real(weak, "mass", 1.15), "column")
 
 
-def test_where_a_surface_stands_in_trim_is_not_heard_as_quieter() -> None:
+def test_another_trim_position_is_not_lower_noise() -> None:
     """With the play found the trim is elsewhere: the old place stood 16 floors off."""
     rig, noise = nominal_rig(False), np.random.default_rng(2).normal(0.0, 2.0, 2400)
     first = Output("airframe", TRIM, noise, lambda rig: np.zeros(2400), 1.0, 120.0)
     elsewhere = replace(first, measured=noise + 1.0, floor=0.1)
-    assert Case(rig, "column", [first], refloored=lambda other: [elsewhere]).heard_anew(rig) is None
+    assert (
+        Case(
+            rig, "column", [first], outputs_with_noise_of=lambda other: [elsewhere]
+        ).with_lower_noise(rig)
+        is None
+    )
     quieter = replace(first, floor=0.1)
-    alike = Case(rig, "column", [first], refloored=lambda other: [quieter]).heard_anew(rig)
+    alike = Case(
+        rig, "column", [first], outputs_with_noise_of=lambda other: [quieter]
+    ).with_lower_noise(rig)
     assert alike is not None
     assert alike.outputs[0].floor == 0.1

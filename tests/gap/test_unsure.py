@@ -28,8 +28,8 @@ def force(rng: np.random.Generator) -> np.ndarray:
 
 
 @cache
-def heard(memory: float) -> list[tuple[float, float]]:
-    """Return of 40 samples what is heard of the power at low frequencies, over the true, and how
+def estimated_power(memory: float) -> list[tuple[float, float]]:
+    """Return of 40 samples the estimated power at low frequencies, over the true, and how
     much more there may be."""
     true, found = Noise(0.15, memory), []
     for seed in range(40):
@@ -47,13 +47,13 @@ def slow(noise: Noise) -> float:
 
 @pytest.mark.parametrize("memory", [0.0, 0.25, 0.4, 0.6])
 def test_the_true_power_is_within_what_may_be(memory: float) -> None:
-    assert min(share * (1.0 + unsure) for share, unsure in heard(memory)) > 0.85
+    assert min(share * (1.0 + unsure) for share, unsure in estimated_power(memory)) > 0.85
     if memory:
-        assert min(share for share, _ in heard(memory)) < 0.8  # what is heard alone
+        assert min(share for share, _ in estimated_power(memory)) < 0.8  # the estimate alone
 
 
 def test_of_white_noise_little_is_unsure() -> None:
-    assert np.median([unsure for _, unsure in heard(0.0)]) < 0.05
+    assert np.median([unsure for _, unsure in estimated_power(0.0)]) < 0.05
 
 
 @pytest.fixture(scope="module")
@@ -82,7 +82,7 @@ def noisy(record: Record, seed: int) -> Record:
 
 
 @pytest.mark.parametrize("seed", [1, 8, 9])
-def test_a_colour_that_was_heard_too_low_is_no_gap(plain: dict[str, Record], seed: int) -> None:
+def test_a_colour_estimated_too_low_is_no_gap(plain: dict[str, Record], seed: int) -> None:
     found = diagnose(gaps.nominal_rig(False), {"r": noisy(plain["healthy"], seed)})
     loader = found.as_dict()["stages"]["loader"]
     assert found.verdict == "no_gap"

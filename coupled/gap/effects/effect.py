@@ -1,7 +1,7 @@
-"""What an entry of the library of effects is, and how effects enter a rig.
+"""The entries of the library of effects, and how an effect changes a rig.
 
-Adding an effect to a rig means writing values under the rig file's own keys, which the same
-stages then fly.
+An effect is added to a rig by changing values under keys of the rig file. The stages are then
+predicted with the changed rig.
 """
 
 from __future__ import annotations
@@ -28,23 +28,24 @@ Drawing = Literal["law", "loop", "time"]
 
 @dataclass(frozen=True)
 class Parameter:
-    """One freed number of the rig: its key in a rig file, and how a fitted value enters it.
+    """A free parameter of an effect: a key of the rig file, and how a fitted value changes it.
 
-    The key is one of a control's, or of the flight's; `{d}` in it and in the name is m, or rad on
-    a wheel. `value` replaces the nominal one, `factor` multiplies it, `added` is added to it; a
-    `switch` has no number, and sets the key to `on`; `yields` is the length over which the rig's
-    dry friction yields before it slips, and sets the stiffness of its contact. `above` is a key
-    from whose nominal value the starts count.
-
-    How its size is scanned: not at all where not `scanned`; `shape` is held at its start when
-    the least size that shows is sought; of an `inverse` one, less does more, and 0 is none. One
-    that `may_end` can stand at a bound while the effect is there. `host` is what the host calls
-    its own number for it, which is then to be set. A frequency `folds` about half of the frame
-    rate. One that `saturates` does all that it can from some size on: a play wider than a motion.
-    One with a `tolerance`, relative for a factor, is off by so much without being there: it is a
-    nuisance parameter.
-    `model_error` is how well, relative, the physics of a right effect gives it, `unsure` by
-    how much it is off at most for what a record does not say.
+    `key`          key of a control or of the flight; `{d}` in it and in the name is m or rad
+    `mode`         `value` replaces the nominal value, `factor` multiplies it, `added` is added to
+                   it; `switch` sets the key to `on`; `yields` is the presliding length, which sets
+                   the stiffness of the contact
+    `low`, `high`  bounds of the fit, `starts` its start values
+    `above`        key whose nominal value is added to the starts
+    `scanned`      the screen varies it
+    `shape`        held at its start in the search for the least size that shows
+    `inverse`      a limit: a smaller value has a larger effect, and 0 is no limit
+    `may_end`      a fit at a bound is admissible
+    `host`         the name of the host's own value, which is then to be corrected
+    `folds`        a frequency, aliased about half of the frame rate
+    `saturates`    larger values make no difference, such as a play wider than the motion
+    `tolerance`    half-width of its range as a nuisance parameter, relative for a factor
+    `model_error`  relative error of the value from the model of a right effect
+    `unsure`       largest error from conditions that the record does not show
     """
 
     name: str
@@ -67,15 +68,15 @@ class Parameter:
     tolerance: float = 0.0
 
     def named(self, control: str) -> str:
-        """Return its name with its unit on this control."""
+        """Return the parameter's name with its unit on a control."""
         return self.name.format(d=unit_of(control))
 
     def key_on(self, control: str) -> str:
-        """Return its key in a rig file, from the control or the flight on."""
+        """Return the parameter's key in a rig file, relative to the control or the flight."""
         return self.key.format(d=unit_of(control))
 
     def unit(self, rig: Rig, control: ControlName) -> str:
-        """Return the unit of the rig's number as it is written: N·s/m."""
+        """Return the unit of the rig's value in text, such as N·s/m."""
         last = self.key_on(control).rpartition(".")[2]
         unit = last.removeprefix(field_of(rig, control, self.key)).lstrip("_")
         over, _, under = unit.partition("per_")
@@ -83,15 +84,15 @@ class Parameter:
         return text.replace("_", "·").removesuffix("3") + ("³" if text.endswith("3") else "")
 
     def nominal(self, rig: Rig, control: ControlName) -> Any:
-        """Return what the rig has."""
+        """Return the rig's value."""
         return value_of(rig, control, self.key)
 
     def base(self, rig: Rig, control: ControlName) -> float:
-        """Return the nominal value from which a start counts, 0 where it has none."""
+        """Return the nominal value to which a start is added, 0 without `above`."""
         return float(value_of(rig, control, self.above)) if self.above else 0.0
 
     def entered(self, nominal: Any, value: float) -> Any:
-        """Return the rig's new number for a fitted value."""
+        """Return the rig's new value for a fitted value."""
         if self.mode == "switch":
             return self.on
         if self.mode == "factor":
@@ -101,22 +102,22 @@ class Parameter:
         return value
 
     def bounds(self, rig: Rig, control: ControlName) -> tuple[float, float]:
-        """Return between which values it may be fitted.
+        """Return the bounds of the fit.
 
-        Of what is added, and is never negative in the rig, all that is filed may be taken off.
+        The lower bound of an `added` parameter that cannot be negative removes the nominal value.
         """
         if self.mode == "added" and self.low == 0.0:
             return -float(self.nominal(rig, control)), self.high
         return self.low, self.high
 
     def error(self, value: float, rig: Rig, control: ControlName) -> float:
-        """Return how well a value is known at best: by its way from none, or by a limit."""
+        """Return the smallest standard error of a value, from the model error and `unsure`."""
         none = self.base(rig, control) if self.above else self.neutral(rig, control)
         size = abs(value) if self.inverse else abs(value - none)
         return hypot(self.model_error * size, self.unsure)
 
     def neutral(self, rig: Rig, control: ControlName) -> float:
-        """Return the value at which the rig's number stays as it is."""
+        """Return the value that leaves the rig's value unchanged."""
         if self.mode == "value":
             return float(self.nominal(rig, control))
         return 1.0 if self.mode == "factor" else 0.0
@@ -124,9 +125,9 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Signature:
-    """How an effect is drawn: y against x as a law, a loop or over time; and its zoom's length.
+    """How an effect is drawn: y against x as a law, a loop or over time, and the zoom's length, s.
 
-    `x` and `y` are names of `plots.signals`.
+    `x` and `y` are names in `plots.signals`.
     """
 
     x: str
@@ -139,11 +140,11 @@ OTHER_FORCE = "another control's force"
 
 
 class Sampled(NamedTuple):
-    """What a record holds of an effect that is random.
+    """The sampling error of a random effect.
 
-    `error` is the relative standard error of its number as an estimate of the process', by the
-    record and its frame in s; `times` are those of the events that it consists of, in s from the
-    record's start, None where it is continuous.
+    `error` returns the relative standard error of the fitted value as an estimate of the process
+    parameter, given a record and its frame time, s. `times` returns the times of events, s from the
+    record's start; it is None for a continuous process.
     """
 
     error: Callable[[Record, float], float]
@@ -154,14 +155,13 @@ class Sampled(NamedTuple):
 class Effect:
     """A named effect of one stage.
 
-    `outputs`      those in which it shows, if not those of its stage
-    `needs`        channels that every record must have for it to be tried; `OTHER_FORCE` is that
-                   of another control
-    `dry`          it is dry friction: its presliding is a nuisance parameter beside it
-    `sampled`      a record holds a random sample of it
-    `seen`         values by parameter where a fit may start, as a rig's residuals show them
-    `of_sensor`    it is one of the sensor of δc, which a set point has none of
-    `contains`     the laws that it is at some value of a further parameter
+    `outputs`      the outputs in which it shows, if not those of its stage
+    `needs`        channels that every record must have; `OTHER_FORCE` is another control's force
+    `dry`          it is dry friction, whose presliding parameters are nuisance parameters
+    `sampled`      its sampling error, if it is a random process
+    `seen`         returns start values by parameter, estimated from the residuals
+    `of_sensor`    it acts in the sensor of δc, which a set point does not have
+    `contains`     names of the laws nested in it
     """
 
     name: str
@@ -178,7 +178,7 @@ class Effect:
 
     @property
     def free(self) -> tuple[Parameter, ...]:
-        """The parameters that have a number to fit."""
+        """The parameters with a value to fit."""
         return tuple(p for p in self.parameters if p.mode != "switch")
 
     @property
@@ -188,7 +188,7 @@ class Effect:
 
     @property
     def gradual(self) -> bool:
-        """Whether its first number is a rate: it grows from the record's start on."""
+        """Whether its first parameter is a rate: the effect grows from the record's start."""
         return bool(self.free) and self.free[0].name == "per_s"
 
     def value_key(self, parameter: Parameter) -> str:
@@ -208,7 +208,7 @@ def _fields(section: type[Section], d: str) -> dict[str, str]:
 
 
 def value_of(rig: Rig, control: ControlName, key: str) -> Any:
-    """Return what a rig has under a key of a control, or of the flight."""
+    """Return a rig's value of a key of a control, or of the flight."""
     section, _, last = key.partition(".")
     holder = rig.flight if section == "flight" else getattr(rig.controls[control], section)
     return getattr(holder, field_of(rig, control, key)) if last else holder
@@ -228,14 +228,14 @@ def apply(
 ) -> Rig:
     """Return the rig with effects added; `values` by "effect.parameter".
 
-    The host's own values stay: its G_B and F_BO are pinned to the nominal. Raises InputError
-    where the physics cannot give such a rig.
+    The host's own values do not change: its G_B and F_BO stay nominal. Raises InputError if the
+    values give no valid rig.
     """
     changes: dict[str, Any] = {}
     lengths: dict[str, float] = {}
     for effect in effects:
         for p in effect.parameters:
-            if p.key in changes or p.key in lengths:  # of an effect before it, which it shares
+            if p.key in changes or p.key in lengths:  # shared with an effect before
                 continue
             value = values.get(effect.value_key(p), 0.0)
             value = value if abs(value) >= SMALLEST else 0.0
@@ -256,7 +256,7 @@ def apply(
 def possible(
     rig: Rig, control: ControlName, effects: Sequence[Effect], values: Mapping[str, float]
 ) -> Rig | None:
-    """Return the rig with effects added, or None where the physics cannot give it."""
+    """Return the rig with effects added, or None if the values give no valid rig."""
     try:
         return apply(rig, control, effects, values)
     except InputError:
@@ -280,10 +280,10 @@ def keys_of(effects: Iterable[Effect]) -> set[str]:
 
 
 def distinct(library: Sequence[Effect], nuisances: Iterable[Effect]) -> list[Effect]:
-    """Return the laws that are not another one beside its nuisance parameters.
+    """Return the library without laws that equal another law with its nuisance parameters.
 
-    Dry friction yields before it slips, and how far is a nuisance parameter where the rig file does
-    not give it: presliding friction is Coulomb friction then.
+    If the rig file does not give the presliding parameters, they are nuisance parameters of Coulomb
+    friction, which then equals presliding friction.
     """
     free = keys_of(nuisances)
     return [
@@ -306,10 +306,9 @@ BY_LOAD, LIGHT_LOAD_N = "loader.friction_by_load", 10.0
 
 
 def _level(rig: Rig, control: ControlName, changes: Mapping[str, Any]) -> float:
-    """Return the dry friction of a rig with changes, N, that its contact carries.
+    """Return the dry friction of a rig with changes, N, that sets its contact stiffness.
 
-    Of what goes with the direction the mean, of what goes with the load that at a light one:
-    a loader that is never loaded more may yield by all that a contact may, too.
+    Of friction by direction the mean counts, and friction by load at a light load.
     """
 
     def of(key: str) -> float:
@@ -322,7 +321,7 @@ def _level(rig: Rig, control: ControlName, changes: Mapping[str, Any]) -> float:
 def _no_less_than_running(
     rig: Rig, control: ControlName, changes: Mapping[str, Any]
 ) -> dict[str, float]:
-    """Return the breakaway raised to the running friction where below it: a file is refused so."""
+    """Return the breakaway force raised to the running friction; a lower one is not valid."""
     if FRICTION not in changes and BREAKAWAY not in changes:
         return {}
     running = float(changes.get(FRICTION, value_of(rig, control, FRICTION)))

@@ -1,4 +1,4 @@
-"""Any number of a rig, freed for a fit: its key as a parameter, between what it may be."""
+"""Free any parameter of a rig for a fit, by its key, within its valid range."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from coupled.record.channels import ControlName, unit_of
 from coupled.rig.rig import Rig
 from coupled.schema import LARGEST, Section, file_keys
 
-# The stage in which a number acts, by its section, and in the loader's by how its key begins.
+# The stage of a key by its section; keys of the loader with a prefix of `OF_LINKAGE`: linkage.
 STAGE_OF_SECTION = {
     "loader": "loader",
     "schedule": "schedule",
@@ -21,24 +21,24 @@ STAGE_OF_SECTION = {
     "flight": "airframe",
 }
 OF_LINKAGE = ("servo", "bend", "play", "arc", "structur", "contact")
-# What is fitted where nothing is asked for, by the stage that the records judge.
+# The default parameters of a fit, by the stage that the records can judge.
 USUAL = {
     "loader": ("mass", "damping", "basic_gradient", "friction", "offset", "delay"),
     "linkage": ("servo_frequency", "servo_damping_ratio", "bend", "play"),
 }
 SERVO_START_Hz = 20.0  # chosen, amid the 8 to 30 Hz of control loaders
-# Numbers of which 0 means that there is none: a fit of one stays above 0.
+# Parameters whose value 0 means that the component is absent: a fit stays above 0.
 NONE_AT_ZERO = (
     *("servo_frequency", "servo_rate_limit", "servo_acceleration_limit", "bend_frequency"),
     *("bend_limit", "force_limit", "play_stiffness", "stop_aft", "stop_forward"),
 )
-FAR = 1e3  # times where a fit starts: as far as a number without a bound may go
+FAR = 1e3  # bound of a parameter without one, over its start
 
 
 def default_keys(rig: Rig, control: ControlName, stages: set[str]) -> tuple[str, ...]:
-    """Return the keys that are usually fitted, of the stages that records judge.
+    """Return the keys that are fitted by default, of the stages that the records can judge.
 
-    A basic gradient of 0 is no spring and a servo frequency of 0 no servo, and they stay so.
+    A basic gradient of 0 is no spring, a servo frequency of 0 no servo; they are not fitted.
     """
     fields = {f: key for key, f in _fields(rig, control, "loader").items()}
     loader, drive = rig.controls[control].loader, rig.controls[control].drive
@@ -55,7 +55,7 @@ def default_keys(rig: Rig, control: ControlName, stages: set[str]) -> tuple[str,
 
 
 def freed(rig: Rig, control: ControlName, key: str) -> Effect:
-    """Return the number of a key as what a fit may free. Raises InputError where it is none."""
+    """Return the parameter of a key as an effect. Raises InputError if the key has no number."""
     section, _, last = key.partition(".")
     if section not in STAGE_OF_SECTION or (section == "flight" and rig.flight is None):
         hint = nearest(section, STAGE_OF_SECTION)
@@ -83,7 +83,7 @@ def _fields(rig: Rig, control: ControlName, section: str) -> dict[str, str]:
 
 
 def _usual_start(key: str, control: ControlName) -> float:
-    """Return where the library's fits of a number begin, for one that is 0 in the file."""
+    """Return the library's start value of a key, for a value of 0 in the file."""
     if key == SERVO:
         return SERVO_START_Hz
     for effect in EFFECTS:
@@ -94,7 +94,7 @@ def _usual_start(key: str, control: ControlName) -> float:
 
 
 def _bounds(holder: Section, field: str, start: float) -> tuple[float, float]:
-    """Return between which values a field may lie, as its declaration has it."""
+    """Return the bounds of a field from its declaration."""
     far = FAR * abs(start)
     low, high = -far, far
     for bound in type(holder).model_fields[field].metadata:

@@ -1,6 +1,6 @@
 """The laws of dry friction in the library of effects.
 
-They are one another's nearest neighbours: each has a level, and differs in what happens about rest.
+All have a running level. They differ in the force near zero speed.
 """
 
 from __future__ import annotations
@@ -65,8 +65,7 @@ FRICTIONS: tuple[Effect, ...] = (
         dry=True,
         contains=("coulomb_friction",),
     ),
-    # By itself it is the same law as plain friction of the mean with a constant force of half the
-    # difference, however the control is moved.
+    # Equivalent to Coulomb friction of the mean level with a constant force of half the difference.
     Effect(
         "asymmetric_friction",
         "loader",

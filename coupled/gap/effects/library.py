@@ -1,8 +1,8 @@
-"""The library of effects: what a rig may have and its nominal model lacks.
+"""The library of effects: differences between a rig and its nominal model.
 
-An entry is data, and all that a diagnosis knows of its effect: a name, the stage where it acts,
-the numbers of the rig file that it frees, with their bounds and where a fit starts, and the
-traits by which it is scanned, judged, distinguished from its like and drawn.
+An entry is data, and holds all that a diagnosis uses of its effect: a name, the stage where it
+acts, the keys of the rig file that it frees, with bounds and start values, and options of the
+screen, the fit and the plot.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from coupled.record.channels import ControlName
 from coupled.rig.rig import Rig
 
 MOTION = "motion_skew"
-# A force that is stamped late, and one that comes late.
+# A time stamp error of the force, and a delay of the force.
 STAMP, LAG = "force_skew", "transport_delay"
 WHOLE_s = 1e4  # a zoom that shows the whole record
 
@@ -123,10 +123,10 @@ BY_NAME = {effect.name: effect for effect in EFFECTS}
 
 
 def library_of(rig: Rig, control: ControlName) -> list[Effect]:
-    """Return the effects as a rig shows them.
+    """Return the library adapted to a rig.
 
-    Where a bob weight hangs, it pulls by the load factor: a motion that is stamped late shows in
-    the loader, too. A rig without a servo has other effects of one (`without_servo`).
+    A bob weight pulls with the load factor: with one, a time stamp error of the motion also shows
+    in the loader. A rig without a servo has other effects of a servo (`without_servo`).
     """
     every = list(EFFECTS)
     if rig.controls[control].loader.servo_frequency == 0.0:
@@ -140,13 +140,13 @@ def library_of(rig: Rig, control: ControlName) -> list[Effect]:
 
 
 def _ends(effect: Effect) -> tuple[float, float, float]:
-    """Return between which values an effect's number is a setting, and its neutral one."""
+    """Return the tolerance limits of an effect's parameter, and its neutral value."""
     neutral = 1.0 if effect.free[0].mode == "factor" else 0.0
     tolerance = effect.free[0].tolerance
     return neutral - tolerance, neutral + tolerance, neutral
 
 
-# {the effect that frees the same number: the setting}, where the rig file gives no tolerance
+# {effect that frees the same key: nuisance parameter}, without tolerances of the rig file
 SETTINGS: dict[str, Effect] = {
     effect.name: setting_of(effect, *_ends(effect))
     for effect in EFFECTS

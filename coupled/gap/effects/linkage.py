@@ -107,8 +107,7 @@ LINKAGE: tuple[Effect, ...] = (
         limit("rate_{d}_per_s", "loader.servo_rate_limit_{d}_per_s", 1e-4, 10, 0.1, 0.18),
         *("speed", "servo_speed", "law", 1.5),
     ),
-    # A motor's torque, or the ramp of a servo's own profile: what asks for less is answered
-    # as quickly as ever.
+    # A motor's torque limit, or the ramp of a servo's profile; smaller accelerations are unchanged.
     one(
         "linkage",
         "servo_acceleration_limit",
@@ -118,8 +117,8 @@ LINKAGE: tuple[Effect, ...] = (
         ),
         *("speed", "servo_speed", "law", 1.5),
     ),
-    # A servo that was fitted without its dead time is too slow: its frequency is found again, and
-    # its damping ratio where that is worth one more number.
+    # A servo fitted without its dead time has too low a frequency: it is fitted again with the
+    # delay, and in `servo_tuning` the damping ratio as well.
     *(
         Effect(
             name,
@@ -154,8 +153,8 @@ LINKAGE: tuple[Effect, ...] = (
 def without_servo(effects: Sequence[Effect]) -> list[Effect]:
     """Return the linkage's effects for a rig without a servo.
 
-    A lag is that of a servo which the rig file lacks, by its frequency in place of a factor on it.
-    The rest of a servo has no meaning there, but for a dead time and a limit of the rate.
+    A lag has the servo's frequency as its parameter, not a factor on it. Of the other effects of a
+    servo, only dead time and rate limit remain.
     """
     lag = limit("frequency_Hz", SERVO, 0.5, 1000, 10.0, 30.0)
     found = []

@@ -1,12 +1,12 @@
-"""How large a machine's forces and motions are in its records: the scale of each number.
+"""The characteristic force, motion and time of a machine in its records, which scale parameters.
 
-A number in the unit Nᵃ·dᵇ·sᶜ has the scale Fᵃ·xᵇ·tᶜ, with the rms force F, the rms motion x about
-its mean, and the time t = x/v by the rms speed v; kg counts as N·s²/d. Friction of one scale is as
-large as the force, a damping of one scale takes all of it.
+A parameter in the unit Nᵃ·dᵇ·sᶜ has the scale Fᵃ·xᵇ·tᶜ, with the rms force F, the rms motion x
+about its mean, and the time t = x/v with the rms speed v; kg is N·s²/d. Friction of one scale
+equals the rms force, and damping of one scale balances it at the rms speed.
 
-The library's starts and bounds are those of a control column. For a machine that is another order
-of magnitude they are multiplied by Fᵃ·xᵇ over the column's, so that a record in other units has the
-same fits; and no bound on a force lies within what the record holds of it.
+The library's starts and bounds suit a control column. For a machine of another order of magnitude
+they are multiplied by Fᵃ·xᵇ over the column's, so that the fits do not depend on units. A bound of
+a force is at least several times the rms force.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from coupled.gap.thresholds import BOUND_SCALES, COLUMN_FORCE_N, COLUMN_WAY, OTH
 from coupled.record.channels import ControlName, unit_of
 from coupled.rig.rig import Rig
 
-# Powers of force, motion and time by the name of a unit; a load factor is a bare number.
+# Powers of force, motion and time by unit; a load factor has no dimension.
 POWERS = {
     "N": (1, 0, 0),
     "kg": (1, -1, 2),
@@ -67,14 +67,14 @@ class Scales:
         return cls(force, way_d, way_d / speed) if min(force, way_d, speed) > 0.0 else None
 
     def size(self, unit: str) -> float | None:
-        """Return one scale of a number in a unit as N·s/m; None of another unit."""
+        """Return the scale of a parameter by its unit, such as N·s/m; None for an unknown unit."""
         powers = _powers(unit)
         if powers is None or not any(powers):
             return None
         return float(np.prod(np.array((self.force_N, self.way, self.time_s)) ** powers))
 
     def times_columns(self, unit: str, control: ControlName) -> float:
-        """Return by what a column's number in a unit is to be multiplied; 1 for a like machine."""
+        """Return the factor on a column's value by its unit; 1 for a machine of similar size."""
         powers = _powers(unit)
         if powers is None:
             return 1.0
@@ -86,7 +86,7 @@ class Scales:
 def in_scale(
     effects: Sequence[Effect], scales: Scales | None, rig: Rig, control: ControlName
 ) -> list[Effect]:
-    """Return effects whose starts and bounds suit the size of a machine in its records."""
+    """Return effects with starts and bounds scaled to a machine."""
     if scales is None:
         return list(effects)
     return [
@@ -98,7 +98,7 @@ def in_scale(
 
 
 def _scaled(p: Parameter, scales: Scales, rig: Rig, control: ControlName) -> Parameter:
-    """Return a parameter with starts and bounds in the scale of the records."""
+    """Return a parameter with scaled starts and bounds."""
     if p.mode not in ("added", "value") or p.key.startswith("flight."):
         return p
     unit = p.unit(rig, control)
@@ -113,7 +113,7 @@ def _scaled(p: Parameter, scales: Scales, rig: Rig, control: ControlName) -> Par
 
 
 def _powers(unit: str) -> tuple[float, float, float] | None:
-    """Return the powers of force, motion and time in a unit as N·s/m; None of another unit."""
+    """Return the powers of force, motion and time in a unit such as N·s/m; None if unknown."""
     over, _, under = unit.partition("/")
     total = np.zeros(3)
     for side, part in ((1, over), (-1, under)):
@@ -127,6 +127,6 @@ def _powers(unit: str) -> tuple[float, float, float] | None:
 
 
 def _split(token: str) -> tuple[str, int]:
-    """Return the name and the power of a part of a unit: m³ is (m, 3)."""
+    """Return the base unit and power of a part of a unit: m³ is (m, 3)."""
     found = re.fullmatch(r"([A-Za-z]+|1)([²³23]?)", token)
     return (found[1], EXPONENTS.get(found[2], 1)) if found else ("", 1)

@@ -1,10 +1,9 @@
-"""Where the fit of an effect starts, as the residuals of a rig show it: hums, ripples and stops.
+"""Start values of effects, estimated from the residuals: hums, ripples and stops.
 
-A ripple is a force that goes as sin or cos of 2π·δc/period. It moves δc by the loader's own
-equation, m·r'' + c·r' + G·r = −F. What that would be is held against the residual for many periods:
-a line in a spectrum, but over the deflection and not over time. So noise counts as it stands in δc,
-where it is white, and not in a force, which the equation would make of it: that is loud at short
-periods.
+A ripple is a force proportional to sin or cos of 2π·δc/period. It moves δc by the loader's
+equation, m·r'' + c·r' + G·r = −F. The residual is regressed on this response for many periods, as
+in a spectrum over the deflection instead of time. The regression is in δc, where the noise is
+white; in the force, the equation would amplify noise at short periods.
 """
 
 from __future__ import annotations
@@ -33,9 +32,9 @@ Complex = NDArray[np.complex128]
 
 
 def hums(outputs: Sequence[Output], rig: Rig, control: ControlName) -> list[dict[str, float]]:
-    """Return amplitude in d, frequency in Hz and phase in rad of the hum that shows most, if any.
+    """Return amplitude, d, frequency, Hz, and phase, rad, of the strongest hum, if there is one.
 
-    By the first record: of the others each has a phase of its own (`sensed`).
+    Only the first record is used: the phase differs between records (`sensed`).
     """
     ours = [output for output in outputs if output.stage == "loader"]
     if not ours:
@@ -47,7 +46,7 @@ def hums(outputs: Sequence[Output], rig: Rig, control: ControlName) -> list[dict
         if tone_Hz < HUM_FROM_Hz:
             continue
         turns = tone_Hz / first.frame_rate_Hz * 2.0 * math.pi
-        # Folded from beyond an odd half of the frame rate, a tone runs backwards.
+        # A tone aliased from an odd Nyquist zone has the opposite phase direction.
         backwards = math.cos(turns - line.turn) < math.cos(turns + line.turn)
         phase = math.remainder(math.pi - line.phase, 2.0 * math.pi) if backwards else line.phase
         return [
@@ -57,9 +56,9 @@ def hums(outputs: Sequence[Output], rig: Rig, control: ControlName) -> list[dict
 
 
 def ripples(outputs: Sequence[Output], rig: Rig, control: ControlName) -> list[dict[str, float]]:
-    """Return amplitude in N, period in d and phase in rad of the ripples that show most, if any.
+    """Return amplitude, N, period, d, and phase, rad, of the strongest ripples, if there are any.
 
-    The one that takes most of the residual comes first.
+    The ripple with the largest projection of the residual comes first.
     """
     ours = [
         output for output in outputs if output.stage == "loader" and "force" not in output.channel
@@ -92,14 +91,14 @@ def ripples(outputs: Sequence[Output], rig: Rig, control: ControlName) -> list[d
 
 
 class _Wave(NamedTuple):
-    """A ripple's values, and what it takes of the residual's power."""
+    """A ripple's values, and its projection of the residual's power."""
 
     values: dict[str, float]
     taken: float
 
 
 def _wave(both: Floats, left: Floats, period: float) -> _Wave:
-    """Return the ripple of one period by what its sine and cosine move, and what is left."""
+    """Return the ripple of one period, from the responses to its sine and cosine."""
     sine, cosine = np.linalg.lstsq(both, left, rcond=None)[0]
     values = {
         "ripple_N": float(np.hypot(sine, cosine)),
@@ -110,7 +109,7 @@ def _wave(both: Floats, left: Floats, period: float) -> _Wave:
 
 
 def _answer(output: Output, rig: Rig, control: ControlName) -> Complex:
-    """Return how the loader answers a force against it at each frequency of a transform, d/N."""
+    """Return the loader's frequency response to a friction force, d/N."""
     data = rig.controls[control]
     turns = 2.0 * np.pi * np.fft.fftfreq(len(output.measured), 1.0 / output.frame_rate_Hz)
     gradient = float(np.mean(data.schedule.total_gradient))

@@ -1,4 +1,4 @@
-"""The effects of what is read, and of the host's own work on it, in the library."""
+"""The effects of sensors, and of the host's computations, in the library."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from coupled.gap.thresholds import CLOCK_s
 
 
 def _force(name: str, parameter: Parameter, x: str, y: str) -> Effect:
-    """Return an effect of what is read, or recorded, of the force."""
+    """Return an effect of the sensor, or of the record, of the force."""
     return replace(one("sensing", name, parameter, x, y), outputs=("loader", "linkage"))
 
 
@@ -72,7 +72,7 @@ SENSING: tuple[Effect, ...] = (
         "sensing",
         (
             added("amplitude_{d}", "sensing.hum_{d}", 0, 0.1, 1e-4),
-            # Its starts are its scale: so fine is a frequency known.
+            # The start sets the scale of difference steps, 0.1 Hz.
             replace(
                 exact(value("frequency_Hz", "sensing.hum_frequency_Hz", 5, 1000, 0.1)), folds=True
             ),

@@ -1,7 +1,7 @@
-"""The settings of a rig: numbers that may be off within a tolerance without being an effect.
+"""The nuisance parameters of a rig: values that may be off within a tolerance without an effect.
 
-A pot is set, and a servo tuned, to a per cent or two. Where a nominal rig was fitted to records of
-the machine (`nominal`), its file holds how well each number is known, and that is its tolerance.
+The default tolerance is 1 or 2 %, to which a potentiometer is set and a servo tuned. The file of a
+nominal rig fitted to records of the machine (`nominal`) has the tolerance of each fitted value.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ MOST_ELASTIC = 0.95
 
 
 def settings(rig: Rig, control: ControlName, outputs: Sequence[Output] = ()) -> dict[str, Effect]:
-    """Return {the effect that frees the same number: the setting, free within its tolerance}.
+    """Return {effect that frees the same key: nuisance parameter within its tolerance}.
 
-    Of the `outputs`, those of loader and linkage in series show the linkage's settings, too.
+    If an output is of loader and linkage in series, the linkage's parameters show in both.
     """
     known = ((effect, _ends(effect, rig, control)) for effect in EFFECTS)
     found = {
-        effect.name: setting_of(effect, *ends, wide=_given(effect, rig, control))
+        effect.name: setting_of(effect, *ends, every_output=_given(effect, rig, control))
         for effect, ends in known
         if ends is not None
     }
@@ -41,25 +41,25 @@ def settings(rig: Rig, control: ControlName, outputs: Sequence[Output] = ()) -> 
 
 
 def lag_within_a_step(rig: Rig, control: ControlName) -> Effect:
-    """Return the setting by which the force may act late on the loader alone, within one step.
+    """Return a delay of the force on the loader as a nuisance parameter, at most one step.
 
-    A simulated hand and loader exchange force and motion once a step of the loader: the force then
-    acts as it stood at the step before.
+    If a simulated hand and loader exchange force and motion once per step of the loader, the force
+    of the step before acts.
     """
     step_s = 1.0 / (rig.frame_rate * rig.substeps)
     return setting_of(BY_NAME[LAG], 0.0, step_s, 0.0)
 
 
 def _given(effect: Effect, rig: Rig, control: ControlName) -> bool:
-    """Tell whether the rig's own tolerance is one of what is read, which shows in more stages."""
+    """Tell whether the rig file has a tolerance of a sensor, which shows in several outputs."""
     given = rig.controls[control].tolerance
     return effect.stage == "sensing" and effect.free[0].key_on(control) in given
 
 
 def contact(rig: Rig, control: ControlName) -> tuple[Effect, ...]:
-    """Return how far dry friction yields and how, as settings; none where the file says it.
+    """Return the presliding parameters as nuisance parameters; none if the rig file has them.
 
-    All dry friction yields before it slips, by up to half a millimetre: how far is no effect.
+    All dry friction has presliding, of up to half a millimetre, so that its length is no effect.
     """
     loader = rig.controls[control].loader
     if loader.friction_stiffness > 0.0:
@@ -77,7 +77,7 @@ def contact(rig: Rig, control: ControlName) -> tuple[Effect, ...]:
 
 
 def most_yielding(control: ControlName) -> float:
-    """Return by how much dry friction may yield before it slips, d."""
+    """Return the largest presliding length, d."""
     return YIELDS_rad if unit_of(control) == "rad" else YIELDS_m
 
 
@@ -89,27 +89,27 @@ def is_dry(rig: Rig, control: ControlName) -> bool:
 
 
 def _ends(effect: Effect, rig: Rig, control: ControlName) -> tuple[float, float, float] | None:
-    """Return the least and largest value of an effect's number as a setting, and its neutral one.
+    """Return the tolerance limits of an effect's parameter, and its neutral value.
 
-    None where it is no setting: an effect of more numbers than one shares the first with another.
+    None without a tolerance, and for an effect of several parameters.
     """
     if len(effect.free) != 1 or len(effect.parameters) != 1:
         return None
     (number,) = effect.free
     tolerance = number.tolerance
-    wide = rig.controls[control].tolerance.get(number.key_on(control))
-    if wide is None and tolerance <= 0.0:
+    filed_tolerance = rig.controls[control].tolerance.get(number.key_on(control))
+    if filed_tolerance is None and tolerance <= 0.0:
         return None
     if number.mode == "factor" and not number.nominal(rig, control):
-        return None  # the rig has none of it, as a servo
+        return None  # the rig lacks the component, such as a servo
     neutral = number.neutral(rig, control)
-    if wide is not None:
+    if filed_tolerance is not None:
         filed = float(number.nominal(rig, control))
         if number.mode == "factor":
-            tolerance = wide / abs(filed) if filed else 0.0
+            tolerance = filed_tolerance / abs(filed) if filed else 0.0
         else:
-            tolerance = wide
-            # What is filed may be taken off, but no more: friction is not negative.
+            tolerance = filed_tolerance
+            # At most the filed value is removed: friction is not negative.
             floor = number.low if number.mode == "value" else min(number.low, 0.0) - abs(filed)
             return max(neutral - tolerance, floor), neutral + tolerance, neutral
     if tolerance <= 0.0:

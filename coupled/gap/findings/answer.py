@@ -54,7 +54,7 @@ def verdict_of(
     that has them is not certain; but not if none of them is credible and the certain effects hold
     that share.
     """
-    guilty = [stage.name for stage in stages if stage.guilty]
+    faulty = [stage.name for stage in stages if stage.guilty]
     blamed = {step.effect.stage for step in choice.steps}
     sure = {effect.name for effect in effects if effect.probability >= CERTAIN}
     open_ones = doubted(choice, effects)
@@ -62,7 +62,7 @@ def verdict_of(
         s.guilty and (s.name not in blamed or s.unexplained) for s in stages
     )
     known = {one.stage: one for one in budget}
-    held = all(_held(known.get(name), sure) >= MOST for name in guilty)
+    held = all(_held(known.get(name), sure) >= MOST for name in faulty)
     if left and not held and (open_ones or _held_together(stages, known, sure) < MOST):
         return "unexplained"
     if not choice.steps:
@@ -113,7 +113,7 @@ def settings_of(
 
     Without effects they are within their tolerance, as the stages are judged then.
     """
-    fit = choice.fit if choice.steps else choice.settled
+    fit = choice.fit if choice.steps else choice.without_effects
     found = []
     for setting in settings(rig, control, outputs).values():
         for p in setting.free:

@@ -88,13 +88,13 @@ class StageBudget:
 
 
 def stage_budget(
-    stage: str, case: Case, settled: Fit, found: Fit, floors: Mapping[tuple[int, str], float]
+    stage: str, case: Case, root: Fit, found: Fit, floors: Mapping[tuple[int, str], float]
 ) -> StageBudget | None:
     """Return a stage's budget; None if neither it nor its neighbours have an output.
 
     `floors` are the noise floors of the improved rig by record and channel, where they are higher.
     """
-    outputs = _outputs(stage, case.outputs, settled, found)
+    outputs = _outputs(stage, case.outputs, root, found)
     if not outputs:
         return None
     players = [e for e in found.effects if touched(outputs, [e])]
@@ -113,7 +113,7 @@ def stage_budget(
     return StageBudget(stage, tuple(each[:-2]), each[-2], each[-1])
 
 
-def _outputs(stage: str, outputs: Sequence[Output], settled: Fit, found: Fit) -> list[Output]:
+def _outputs(stage: str, outputs: Sequence[Output], root: Fit, found: Fit) -> list[Output]:
     """Return the stage's outputs with a gap, or the one with the largest if none has.
 
     For a stage without outputs they are those of the stages in which its effects show.
@@ -121,8 +121,8 @@ def _outputs(stage: str, outputs: Sequence[Output], settled: Fit, found: Fit) ->
     shown = {at for e in found.effects if e.stage == stage for at in e.shows_in}
     own = [output for output in outputs if output.stage in STAGE_OF[stage].outputs]
     own = own or [output for output in outputs if output.stage in shown]
-    wide = [output for output in own if output.gap(settled.rig) > output.limit]
-    return wide or sorted(own, key=lambda o: -o.gap(settled.rig))[:1]
+    over_limit = [output for output in own if output.gap(root.rig) > output.limit]
+    return over_limit or sorted(own, key=lambda o: -o.gap(root.rig))[:1]
 
 
 @dataclass(frozen=True)

@@ -130,7 +130,7 @@ class Diagnosis(Findings, TableResult):
     @cached_property
     def power(self) -> tuple[EffectPower, ...]:
         """The smallest size of each effect that would have been detected."""
-        return power(self.choice.settled.rig, self.control, self.outputs)
+        return power(self.choice.without_effects.rig, self.control, self.outputs)
 
     @cached_property
     def summary(self) -> str:

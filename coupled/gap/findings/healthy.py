@@ -29,7 +29,7 @@ from coupled.gap.noise.smooth import smoothed
 from coupled.gap.search.case import Case
 from coupled.gap.search.found import Fit
 from coupled.gap.search.problem import Problem
-from coupled.gap.signals.output import Hides, Output, Part
+from coupled.gap.signals.output import HiddenGap, Output, Part
 from coupled.gap.thresholds import HEALTHY_ALONE, HEALTHY_SIGMAS
 from coupled.record.channels import ControlName
 from coupled.record.record import Record
@@ -89,7 +89,9 @@ class ModelError:
         floor = math.hypot(output.floor, error)
         share = (error / floor) ** 2
         hidden = floor / max(output.does, 1e-300)
-        hides = Hides(hidden, output.channel, output.channel, self.misses) if self.misses else None
+        hidden_gap = (
+            HiddenGap(hidden, output.channel, output.channel, self.misses) if self.misses else None
+        )
         stretches = max(len(np.unique(output.stretches)), 1)
         scatter = math.hypot(self.by_stretch / math.sqrt(stretches), self.by_record)
         return replace(
@@ -98,7 +100,7 @@ class ModelError:
             spread=math.hypot((1.0 - share) * output.spread, share * scatter),
             smoothed=(1.0 - share) * output.smoothed,
             unsure=(1.0 - share) * output.unsure,
-            hides=hides,
+            hidden_gap=hidden_gap,
             _known=[],
         )
 

@@ -10,7 +10,7 @@ from coupled.gap.chain import CHAIN, stage_of
 from coupled.gap.findings.result import StageResult
 from coupled.gap.findings.where import remains, where
 from coupled.gap.search.found import Choice
-from coupled.gap.signals.output import Hides, Output, explained_below, stage_gaps, stage_limits
+from coupled.gap.signals.output import HiddenGap, Output, explained_below, stage_gaps, stage_limits
 from coupled.gap.stages.airframe import needs
 from coupled.gap.stages.stages import Reader
 from coupled.gap.thresholds import MOST
@@ -55,21 +55,21 @@ class Judge:
         half of a gap there. If the effect is in `doubted`, the stage with the largest gap is
         included instead.
         """
-        settled = stage_gaps(self.outputs, self.choice.settled.rig)
+        root = stage_gaps(self.outputs, self.choice.without_effects.rig)
         found: set[str] = set()
         for effect in (step.effect for step in self.choice.steps):
-            seen = [out for out in effect.shows_in if out in settled]
+            seen = [out for out in effect.shows_in if out in root]
             if effect.stage in effect.shows_in:
                 found.add(effect.stage)
-            elif any(self.last[o] - 1.0 < (1.0 - MOST) * (settled[o] - 1.0) for o in seen):
-                widest = stage_of(max(seen, key=lambda out: settled[out]))
+            elif any(self.last[o] - 1.0 < (1.0 - MOST) * (root[o] - 1.0) for o in seen):
+                widest = stage_of(max(seen, key=lambda out: root[out]))
                 found.add(widest if effect.name in self.doubted else effect.stage)
         return found
 
     def stages(self) -> tuple[StageResult, ...]:
         """Return the stages of the rig, in the order of the chain."""
         before = _by_stage(stage_gaps(self.outputs, self.rig))
-        settled = _by_stage(stage_gaps(self.outputs, self.choice.settled.rig))
+        root = _by_stage(stage_gaps(self.outputs, self.choice.without_effects.rig))
         left, limits = _by_stage(self.last), _by_stage(stage_limits(self.outputs))
         lacking = self._lacking()
         found = []
@@ -77,14 +77,14 @@ class Judge:
             name = stage.name
             result: StageResult | None
             if name in before and name not in lacking:
-                wide = left[name] > explained_below(settled[name], limits[name])
-                guilty = name in self.blamed or wide
-                hidden = None if guilty else self._hidden(name)
+                unexplained = left[name] > explained_below(root[name], limits[name])
+                faulty = name in self.blamed or unexplained
+                hidden = None if faulty else self._hidden(name)
                 if hidden is not None:
                     found += [StageResult(name, why=hidden.words, hidden=hidden)]
                     continue
-                numbers = (before[name], settled[name], limits[name], left[name])
-                result = self._with_where(StageResult(name, *numbers, guilty=guilty))
+                numbers = (before[name], root[name], limits[name], left[name])
+                result = self._with_where(StageResult(name, *numbers, guilty=faulty))
             elif name == "sensing":
                 result = self._with_where(self._sensing(before))
             elif name in lacking:
@@ -94,10 +94,10 @@ class Judge:
             found += [result] if result is not None else []
         return tuple(found)
 
-    def _hidden(self, stage: str) -> Hides | None:
+    def _hidden(self, stage: str) -> HiddenGap | None:
         """Return what hides a gap of the stage; None if one of its floors is low enough."""
         outputs = [output for output in self.outputs if output.stage == stage]
-        known = [output.hides for output in outputs if output.hides is not None]
+        known = [output.hidden_gap for output in outputs if output.hidden_gap is not None]
         least = min(known, key=lambda one: one.share, default=None)
         return least if least is not None and least.much else None
 
@@ -156,7 +156,7 @@ class Judge:
             return found
         # With fitted nuisance parameters, unless these hide the gap at their bounds.
         hidden = found.settled is not None and found.settled <= (found.limit or 0.0)
-        rig = self.rig if hidden else self.choice.settled.rig
+        rig = self.rig if hidden else self.choice.without_effects.rig
         widest = max(ours, key=lambda o: o.gap(rig))
         reader = self.readers[widest.record]
         found = replace(found, where=where(widest, rig, reader.record, reader.control))

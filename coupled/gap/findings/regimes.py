@@ -84,7 +84,7 @@ def regimes(case: Case, acts: Sequence[Acts]) -> tuple[Regime, ...]:
     if len({one.output.record for one in acts}) > 1:
         by["record"] = [(one, np.full(len(one.left), float(one.output.record))) for one in acts]
     # If the floor is a model error, it may have one sign throughout a half.
-    lasting = 1.0 if case.only_wide else 0.0
+    lasting = 1.0 if case.model_error_in_floors else 0.0
     found = (_regime(name, parts, lasting) for name, parts in by.items())
     return tuple(one for one in found if one is not None)
 

@@ -14,8 +14,8 @@ from coupled.gap.findings.budget import StageBudget
 from coupled.gap.findings.credibility import Credibility, remainder
 from coupled.gap.findings.where import Remains, Where
 from coupled.gap.search.course import Course
-from coupled.gap.signals.output import Hides, explained_below
-from coupled.gap.thresholds import GUILTY_FROM
+from coupled.gap.signals.output import HiddenGap, explained_below
+from coupled.gap.thresholds import FAULTY_FROM
 
 # Of the JSON. A file without a format is read as one from before formats were numbered; a newer
 # format is refused (`files.check_format`).
@@ -44,7 +44,7 @@ class StageResult:
     missing: tuple[str, ...] = ()
     why: str = ""
     shown_in: tuple[str, ...] = ()
-    hidden: Hides | None = None
+    hidden: HiddenGap | None = None
 
     @property
     def judged(self) -> bool:
@@ -55,7 +55,7 @@ class StageResult:
     def explained_below(self) -> float:
         """The gap up to which the effects found explain the stage."""
         if self.settled is None or self.limit is None:
-            return GUILTY_FROM if self.limit is None else self.limit
+            return FAULTY_FROM if self.limit is None else self.limit
         return explained_below(self.settled, self.limit)
 
     @property

@@ -73,9 +73,9 @@ Floors = Mapping[tuple[int, str], float]
 
 def floors_of(case: Case, choice: Choice) -> dict[tuple[int, str], float]:
     """Return the noise floors with the improved rig by record and channel."""
-    if not choice.fit.effects or case.refloored is None:
+    if not choice.fit.effects or case.outputs_with_noise_of is None:
         return {}
-    return {(o.record, o.channel): o.floor for o in case.refloored(choice.fit.rig)}
+    return {(o.record, o.channel): o.floor for o in case.outputs_with_noise_of(choice.fit.rig)}
 
 
 def shrink(case: Case, fitted: Fit, floors: Floors) -> Shrink:

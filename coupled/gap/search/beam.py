@@ -1,17 +1,17 @@
-"""The search for the set of effects that explains a record: a beam over sets, by their evidence.
+"""The search for the set of effects that explains a record: a beam search by log evidence.
 
 A set of effects is fitted together with the nuisance parameters, always on the whole record, and
-has a log evidence (`evidence`). From each of the best sets the search goes to its neighbours:
+has a log evidence (`evidence`). At each depth the neighbours of the best sets are fitted:
 
-    add       one effect more, of those whose signature takes most of the residual (`screen`)
-    replace   a law by one that contains it, or that it contains
-    swap      an effect for another that shows in the same output
+    add       one effect more, chosen by the predicted gain of its signature (`screen`)
+    replace   a law by a law that contains it, or that it contains
+    swap      an effect for another effect of the same output
     drop      one effect less
 
-and goes on with the best, until every stage is explained, or no set is new. Each neighbour is
-fitted from the same starts: its parent's optimum with the new parameters at a few sizes, with the
-contact of dry friction sought on a grid, and, for a law of friction, where a fit to short replays
-ends (multiple shooting). A few steps come first; starts that are far behind are given up.
+The search ends when every stage is explained or no set is new. A fit of a neighbour starts from its
+parent's optimum, with the new parameters at a few sizes. The presliding parameters of dry friction
+start from a grid search; laws of friction are also started from a fit by multiple shooting. All
+starts are fitted for a few evaluations, and those far behind the best are dropped.
 """
 
 from __future__ import annotations
@@ -49,44 +49,46 @@ from coupled.parallel import in_threads
 Floats = NDArray[np.float64]
 Names = frozenset[str]
 Start = dict[str, float]
-Try = tuple[tuple[Effect, ...], Start, Fit]  # effects, where their fit starts, its parent
-Begun = tuple[float, Fit, Fit]  # log evidence of a begun fit, and its parent
-WIDE, OWN = Descent("wide"), Descent("own")
-FIRST, SHORT = Descent("wide", BEAM_FIRST), Descent("wide", SHOOTINGS)
-ABOVE = (1.05, 1.5)  # times the running friction, where the fit of a breakaway starts
+Try = tuple[tuple[Effect, ...], Start, Fit]  # effects, start values, parent
+Started = tuple[float, Fit, Fit]  # log evidence, unfinished fit, parent
+COARSE, OWN = Descent("coarse"), Descent("own")
+FIRST, SHORT = Descent("coarse", BEAM_FIRST), Descent("coarse", SHOOTINGS)
+ABOVE = (1.05, 1.5)  # starts of a breakaway force, over the running friction
 
 
 def search_sets(case: Case, library: Sequence[Effect]) -> tuple[Case, Choice]:
-    """Return the effects that explain a record's gap, and the case with its noise as known then.
+    """Return the effects that explain a record's gap, and the case with its final noise floors.
 
-    Noise is estimated with the rig file's parameters, where a gap may pass for coloured noise. It
-    is estimated once more with the best set, and the search repeated where it is lower.
+    Noise is first estimated with the rig file's parameters, so that part of the gap may count as
+    coloured noise. It is estimated again with the best set. If it is lower, the search is repeated.
     """
     problem = Problem(case)
     root = problem.fit(())
-    problem = problem.surely_open(problem.within_tolerance(root).rig)
-    beam, rounds = _searched(problem, library, [root])
-    case, anew = problem.case, problem.case.heard_anew(beam.fits[beam.best].rig)
+    problem = problem.without_colour_allowance(problem.within_tolerance(root).rig)
+    beam, rounds = _search_from(problem, library, [root])
+    case, anew = problem.case, problem.case.with_lower_noise(beam.fits[beam.best].rig)
     if anew is not None and beam.best:
         leading = [frozenset[str](), *(names for names in beam.leading() if names)]
         problem = Problem(anew)
         ends = [beam.fits[names] for names in leading]
         known = [problem.fit(one.effects, one.values, None, OWN) for one in ends]
-        case, (beam, more) = anew, _searched(problem, library, known)
+        case, (beam, more) = anew, _search_from(problem, library, known)
         rounds = (*rounds, *more)
-    return case, _with_contact_named(beam, _choice(beam, rounds), library)
+    return case, _name_law_with_contact(beam, _choose(beam, rounds), library)
 
 
 @dataclass
 class Beam:
-    """The sets fitted so far, by their effects' names, and what their evidence consists of.
+    """The sets fitted so far, by their effects' names, and the terms of their evidence.
 
-    `counts` are the effective samples of each output, `contact` how dry friction yields by the fit
-    that sought it last.
+    `without_effects` is the fit of the nuisance parameters alone, within their tolerance.
+    `variance` is that of each output's residual, noise floors², `counts` its effective samples.
+    `finished` are the sets fitted at the loader's own steps. `contact` holds the presliding
+    parameters of dry friction from the last fit that estimated them.
     """
 
     problem: Problem
-    settled: Fit
+    without_effects: Fit
     variance: Floats
     counts: Floats = field(default_factory=lambda: np.zeros(0))
     fits: dict[Names, Fit] = field(default_factory=dict)
@@ -96,16 +98,16 @@ class Beam:
     contact: Start = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Screen candidates by signatures that are taken once."""
+        """Make the screen of candidates, which caches their signatures."""
         self.screen = Screen(self.problem, self.variance)
 
     def add(self, fitted: Fit) -> None:
-        """Add a fit; of two of one set the one stays that may be true, or else the more likely."""
+        """Add a fit; of two fits of a set keep the admissible one, then that of higher evidence."""
         names = names_of(fitted.effects)
         new = evidence(self.problem, fitted, self.variance)
 
         def rank(fit: Fit, known: Evidence) -> tuple[bool, float]:
-            return may_be_true(self.problem, fit), known.log(self.counts)
+            return is_admissible(self.problem, fit), known.log(self.counts)
 
         if names not in self.fits or rank(fitted, new) > rank(self.fits[names], self.known[names]):
             self.fits[names], self.known[names] = fitted, new
@@ -115,38 +117,40 @@ class Beam:
         return self.known[names].log(self.counts)
 
     def valid(self) -> list[Names]:
-        """Return the sets that may be true."""
-        return [n for n, fitted in self.fits.items() if not n or may_be_true(self.problem, fitted)]
+        """Return the admissible sets (`is_admissible`)."""
+        return [
+            n for n, fitted in self.fits.items() if not n or is_admissible(self.problem, fitted)
+        ]
 
     def ranked(self) -> list[Names]:
-        """Return the sets that may be true, the most likely first."""
+        """Return the admissible sets, the one of highest evidence first."""
         return sorted(self.valid(), key=self.log, reverse=True)
 
     def leading(self) -> list[Names]:
-        """Return the most likely sets that are not far behind the best."""
+        """Return the best admissible sets, without those far behind the first."""
         ranked = self.ranked()[:BEAM_WIDTH]
         return [names for names in ranked if self.log(names) > self.log(ranked[0]) - GIVEN_UP]
 
     def recount(self) -> None:
-        """Count effective samples by what the sets leave, and find the best set by them."""
+        """Update the effective samples from the sets' residuals, and the best set."""
         self.counts = fewest_unexplained([self.known[names] for names in self.valid()])
         self.best = self.ranked()[0]
 
     def worth(self, names: Names) -> Worth:
-        """Return the predicted gain with which one effect more may beat the best set, or none.
+        """Return the predicted gain that one effect more needs to make a set the best one.
 
-        It then brings what the effect's own prior costs, if the nuisance parameters' priors, which
-        it may relieve, do not.
+        The gain must exceed the log prior of an effect and the evidence by which the set is behind
+        the best one. The nuisance parameters' prior penalty is deducted: the effect may remove it.
         """
         relief = sum(group.penalty for group in self.fits[names].groups.values())
         behind = self.log(self.best) - self.log(names) if names else 0.0
         return Worth(PRIOR_EFFECT + behind - relief, self.counts)
 
     def open_outputs(self, names: Names) -> set[str]:
-        """Return the outputs that a set leaves wider than noise and the physics' own error."""
+        """Return the outputs whose residual exceeds the noise and the model error with a set."""
         case = self.problem.case
-        first, limits = case.gaps(self.settled.rig), stage_limits(case.outputs)
-        rig = self.fits[names].rig if names else self.settled.rig
+        first, limits = case.gaps(self.without_effects.rig), stage_limits(case.outputs)
+        rig = self.fits[names].rig if names else self.without_effects.rig
         left = case.gaps(rig) if names == self.best else stage_gaps(case.outputs, rig)
         explained = {
             at: limit if at in EXACT else explained_below(first[at], limit)
@@ -160,11 +164,15 @@ def names_of(effects: Iterable[Effect]) -> Names:
     return frozenset(effect.name for effect in effects)
 
 
-def may_be_true(problem: Problem, fitted: Fit) -> bool:
-    """Tell whether each effect has a size, none at a bound nor faster than frames show."""
+def is_admissible(problem: Problem, fitted: Fit) -> bool:
+    """Tell whether a fit is admissible.
+
+    The interval of each effect's size excludes the neutral value, no parameter is at a bound, and
+    no frequency is above the Nyquist frequency.
+    """
     fastest = 0.5 * min(output.frame_rate_Hz for output in problem.outputs)
     for effect in fitted.effects:
-        if not _has_size(problem.case, fitted, effect):
+        if not _excludes_neutral(problem.case, fitted, effect):
             return False
         for p in effect.free:
             key = effect.value_key(p)
@@ -175,8 +183,8 @@ def may_be_true(problem: Problem, fitted: Fit) -> bool:
     return True
 
 
-def _has_size(case: Case, fitted: Fit, effect: Effect) -> bool:
-    """Tell whether the 95 % interval of a size excludes the neutral value; a limit has one."""
+def _excludes_neutral(case: Case, fitted: Fit, effect: Effect) -> bool:
+    """Tell whether the 95 % interval of a size excludes the neutral value; true for a limit."""
     sizes = [p for p in effect.free if p.scanned]
     for p in sizes:
         key, none = effect.value_key(p), p.neutral(case.nominal, case.control)
@@ -185,86 +193,90 @@ def _has_size(case: Case, fitted: Fit, effect: Effect) -> bool:
     return not sizes
 
 
-def _searched(
+def _search_from(
     problem: Problem, library: Sequence[Effect], known: Sequence[Fit]
 ) -> tuple[Beam, tuple[dict[str, float], ...]]:
-    """Return the sets of a library's effects about the best, begun with known fits.
+    """Search the sets of a library's effects from known fits, the first without effects.
 
-    The first of these is without effects. Returned, too, is what each depth gained (`_grow`).
+    Return the beam, and the gains of each depth (`_search_by_depth`).
     """
-    settled, case = problem.within_tolerance(known[0]), problem.case
-    beam = Beam(problem, settled, problem.variances(settled.rig))
+    without_effects, case = problem.within_tolerance(known[0]), problem.case
+    beam = Beam(problem, without_effects, problem.variances(without_effects.rig))
     for fitted in known:
         beam.add(fitted)
     beam.recount()
-    return beam, _grow(beam, distinct(library, case.contact) if case.contact else list(library))
+    return beam, _search_by_depth(
+        beam, distinct(library, case.contact) if case.contact else list(library)
+    )
 
 
-def _grow(beam: Beam, library: Sequence[Effect]) -> tuple[dict[str, float], ...]:
+def _search_by_depth(beam: Beam, library: Sequence[Effect]) -> tuple[dict[str, float], ...]:
     """Fit the neighbours of the best sets, depth by depth, until one explains every stage.
 
-    Return the log evidence that each depth's sets gain, by the effect added. Discrete effects are
-    tried without screening, since they have no size that could be too small: in outputs that are
-    open, and in those whose laws are exact, where a high noise floor may hide them.
+    Return the gain in log evidence of each depth's sets, by the effect added. Discrete effects are
+    fitted without screening, since their size is fixed. They are fitted in outputs that are not yet
+    explained, and in outputs whose laws are exact, where a high noise floor may mask them.
     """
     front, best, known = beam.leading(), beam.best, set(beam.fits)
     depths = list[tuple[Names, set[Names]]]()
     if not best:
         root, shown = beam.fits[best], {*EXACT, *beam.open_outputs(best)}
-        discrete = [e for e in _beside((), library, shown) if not e.free]
+        discrete = [e for e in _candidates((), library, shown) if not e.free]
         _fit_sets(beam, [((e,), dict(root.values), root) for e in discrete])
         front = list(dict.fromkeys([best, beam.best]))
     for _ in range(BEAM_DEPTH):
         if not front or (best and not beam.open_outputs(best)):
             break
         for names in front:
-            if wide := beam.open_outputs(names):
-                _expand(beam, beam.fits[names], library, wide)
+            if wanted := beam.open_outputs(names):
+                _fit_neighbours(beam, beam.fits[names], library, wanted)
         new = set(beam.fits) - known
         if not new:
             break
         _finish(beam)
-        _shoot(beam)
+        _fit_by_multiple_shooting(beam)
         depths.append((front[0], new))
         if beam.best == best:
             break
         best, known = beam.best, set(beam.fits)
         front = [names for names in beam.leading() if names and names not in front]
-    _look_around(beam, library)
+    _fit_neighbours_of_best(beam, library)
     return tuple(
         {beam.fits[one].effects[-1].name: beam.log(one) - beam.log(base) for one in new}
         for base, new in depths
     )
 
 
-def _look_around(beam: Beam, library: Sequence[Effect]) -> None:
-    """Fit what the best set is without each effect, and with each law next to one of its own.
+def _fit_neighbours_of_best(beam: Beam, library: Sequence[Effect]) -> None:
+    """Fit the sets with one effect less than the best set, and with a nested law in its place.
 
-    A law that the best one contains is fitted from this one's nuisance parameters as well. A law of
-    several parameters may be equivalent to two effects of fewer: these are fitted, too.
+    A law of several parameters may be equivalent to two effects of fewer parameters, so these sets
+    are fitted as well. Repeat while the best set changes.
     """
     while beam.best:
         best, fitted = beam.best, beam.fits[beam.best]
-        fewer = [one for one in _without(fitted) if names_of(one[0]) not in beam.fits]
-        _fit_sets(beam, [*fewer, *_laws(beam, fitted, library)])
+        fewer = [one for one in _sets_without_one(fitted) if names_of(one[0]) not in beam.fits]
+        _fit_sets(beam, [*fewer, *_sets_with_other_law(beam, fitted, library)])
         for law in fitted.effects:
-            if (part := _part_of(beam, law)) is not None:
-                beside = _beside(part.effects, library, {*law.shows_in})
+            if (part := _fit_with_simpler_law(beam, law)) is not None:
+                beside = _candidates(part.effects, library, {*law.shows_in})
                 worth = Worth(PRIOR_EFFECT, beam.counts)
                 screened = beam.screen.best(part, beside, worth, BEAM_BESIDE)
-                _fit_sets(beam, [t for one in screened for t in _tries(part, one, beam.contact)])
+                _fit_sets(
+                    beam,
+                    [t for one in screened for t in _starts_with_one_more(part, one, beam.contact)],
+                )
         _finish(beam)
-        _restart_as_simple(beam)
+        _restart_simple_sets(beam)
         if beam.best == best:
             return
 
 
-def _restart_as_simple(beam: Beam) -> None:
-    """Fit sets with dry friction that are as simple as the best from other nuisance parameters.
+def _restart_simple_sets(beam: Beam) -> None:
+    """Restart fits of sets with dry friction and no more parameters than the best set.
 
-    With dry friction the cost has local minima. One of a set with no more parameters must not
-    decide for the best set. Fits start from the nuisance parameters as filed, and from the best
-    set's.
+    With dry friction the cost has local minima, and a poor one of a simpler set would favour the
+    best set. The restarts use the nuisance parameters as filed, and those of the best set.
     """
     problem, best = beam.problem, beam.fits[beam.best]
     numbers = _numbers(best)
@@ -289,10 +301,10 @@ def _numbers(fitted: Fit) -> int:
     return sum(len(effect.free) for effect in fitted.effects)
 
 
-def _part_of(beam: Beam, law: Effect) -> Fit | None:
+def _fit_with_simpler_law(beam: Beam, law: Effect) -> Fit | None:
     """Return the best fit with an effect of fewer parameters in place of a law of the best set.
 
-    Both show in the same output. None where there is none, or its neighbours were fitted.
+    Both show in the same output. Return None if there is none, or if its neighbours are fitted.
     """
     rest = beam.best - {law.name}
     for names in beam.ranked():
@@ -304,38 +316,47 @@ def _part_of(beam: Beam, law: Effect) -> Fit | None:
     return None
 
 
-def _expand(beam: Beam, fitted: Fit, library: Sequence[Effect], wide: set[str]) -> None:
-    """Fit the sets next to a fitted one.
+def _fit_neighbours(beam: Beam, fitted: Fit, library: Sequence[Effect], wanted: set[str]) -> None:
+    """Fit the neighbours of a fitted set, with effects that show in the `wanted` outputs.
 
-    A law that contains another is fitted after it, from where that one ended, and a law of dry
-    friction with the contact of one that was fitted before. Effects are screened by what is left
-    with nuisance parameters within their tolerance: beyond it, these may have taken an effect up.
+    A law that contains another law is fitted after it, from its optimum. Laws of dry friction start
+    from presliding parameters that were fitted before. Effects are screened with the nuisance
+    parameters within their tolerance: beyond it they may have absorbed an effect.
     """
     is_best, fitted = names_of(fitted.effects) == beam.best, beam.problem.within_tolerance(fitted)
     many = BEAM_CANDIDATES if is_best else BEAM_BESIDE
-    beside, worth = _beside(fitted.effects, library, wide), beam.worth(names_of(fitted.effects))
+    beside, worth = (
+        _candidates(fitted.effects, library, wanted),
+        beam.worth(names_of(fitted.effects)),
+    )
     screened = beam.screen.best(fitted, beside, worth, many, anew=is_best)
     if not screened and is_best and (pair := beam.screen.pair(fitted, beside, worth)):
-        _fit_sets(beam, _both(fitted, *pair))
+        _fit_sets(beam, _starts_with_two_more(fitted, *pair))
     effects = [one.effect for one in screened]
     plain = [one for one in screened if not any(contains(one.effect, e) for e in effects)]
     dry = next((one for one in plain if one.effect.dry), None)
     if dry is not None and not beam.contact:
-        ends = _fit_sets(beam, _tries(fitted, dry, {}))
-        beam.contact = _contact(beam, ends[0]) if ends else {}
-    ends = _fit_sets(beam, [t for one in plain for t in _tries(fitted, one, beam.contact)])
+        ends = _fit_sets(beam, _starts_with_one_more(fitted, dry, {}))
+        beam.contact = _contact_values(beam, ends[0]) if ends else {}
+    ends = _fit_sets(
+        beam, [t for one in plain for t in _starts_with_one_more(fitted, one, beam.contact)]
+    )
     wider = [one for one in screened if one not in plain]
-    others = [t for one in wider for t in _tries(fitted, one, beam.contact)]
+    others = [t for one in wider for t in _starts_with_one_more(fitted, one, beam.contact)]
     for end in ends:
-        others += [t for one in wider for t in _in_place(beam, end, end.effects[-1], one.effect)]
-    others += _laws(beam, fitted, library)
+        others += [
+            t
+            for one in wider
+            for t in _starts_with_other_law(beam, end, end.effects[-1], one.effect)
+        ]
+    others += _sets_with_other_law(beam, fitted, library)
     if len(fitted.effects) > 1:
-        others += [*_swaps(beam, fitted, library), *_without(fitted)]
+        others += [*_sets_with_swap(beam, fitted, library), *_sets_without_one(fitted)]
     _fit_sets(beam, others)
 
 
-def _shoot(beam: Beam) -> None:
-    """Fit the sets with dry friction from where fits to short replays end, if the best is open."""
+def _fit_by_multiple_shooting(beam: Beam) -> None:
+    """Restart sets with dry friction from multiple shooting, if the loader is unexplained."""
     short, best = beam.problem.by_shots, beam.fits[beam.best]
     if short is None or "loader" not in beam.problem.over_limit(best.rig):
         return
@@ -350,33 +371,33 @@ def _shoot(beam: Beam) -> None:
 
     def shot(fitted: Fit) -> Start:
         ours = {effect.value_key(p) for effect in fitted.effects for p in effect.free}
-        begun = {key: value for key, value in fitted.values.items() if key in ours}
-        return dict(short.fit(fitted.effects, begun, None, SHORT).values)
+        started = {key: value for key, value in fitted.values.items() if key in ours}
+        return dict(short.fit(fitted.effects, started, None, SHORT).values)
 
     starts = in_threads(shot, dry)
     _fit_sets(beam, [(f.effects, start, f) for f, start in zip(dry, starts, strict=True)])
     _finish(beam)
 
 
-def _beside(
+def _candidates(
     effects: Sequence[Effect], library: Sequence[Effect], outputs: set[str]
 ) -> list[Effect]:
-    """Return the effects that show in some outputs, and share no number with those of a set."""
+    """Return the effects that show in some outputs, and share no parameter with a set."""
     taken = keys_of(effects)
     return [
         one for one in library if outputs & {*one.shows_in} and taken.isdisjoint(keys_of([one]))
     ]
 
 
-def _tries(fitted: Fit, one: Screened, contact: Mapping[str, float]) -> list[Try]:
-    """Return the starts of a set with one effect more; `contact` is that of its dry friction."""
+def _starts_with_one_more(fitted: Fit, one: Screened, contact: Mapping[str, float]) -> list[Try]:
+    """Return the starts of a set with one effect more; `contact`: its presliding parameters."""
     effects = (*fitted.effects, one.effect)
     beside = contact if one.effect.dry else {}
     return [(effects, {**beside, **fitted.values, **start}, fitted) for start in one.starts]
 
 
-def _both(fitted: Fit, one: Screened, other: Screened) -> list[Try]:
-    """Return the starts of a set with two effects more; none where these share a number."""
+def _starts_with_two_more(fitted: Fit, one: Screened, other: Screened) -> list[Try]:
+    """Return the starts of a set with two effects more; none if these share a parameter."""
     if keys_of([one.effect]) & keys_of([other.effect]):
         return []
     effects = (*fitted.effects, one.effect, other.effect)
@@ -384,27 +405,29 @@ def _both(fitted: Fit, one: Screened, other: Screened) -> list[Try]:
     return [(effects, {**fitted.values, **first, **second}, fitted) for first, second in pairs]
 
 
-def _contact(beam: Beam, fitted: Fit) -> Start:
-    """Return the contact of dry friction in a fit, as far as it is a nuisance parameter."""
+def _contact_values(beam: Beam, fitted: Fit) -> Start:
+    """Return the presliding parameters of a fit that are nuisance parameters."""
     keys = {one.value_key(p) for one in beam.problem.case.contact for p in one.free}
     return {key: value for key, value in fitted.values.items() if key in keys}
 
 
-def _swaps(beam: Beam, fitted: Fit, library: Sequence[Effect]) -> list[Try]:
-    """Return the sets with another effect, that shows in the same output, in place of one."""
+def _sets_with_swap(beam: Beam, fitted: Fit, library: Sequence[Effect]) -> list[Try]:
+    """Return the sets with one effect swapped for another effect of the same output."""
     tries: list[Try] = []
     for old in fitted.effects:
         rest = tuple(effect for effect in fitted.effects if effect is not old)
         rig = beam.problem.rig_of(rest, fitted.values)
-        same = [e for e in _beside(rest, library, {*old.shows_in}) if e is not old]
+        same = [e for e in _candidates(rest, library, {*old.shows_in}) if e is not old]
         if rig is not None:
             base = replace(fitted, effects=rest, rig=rig)
             found = beam.screen.best(base, same, beam.worth(beam.best), BEAM_BESIDE)
-            tries += [t for one in found for t in _tries(base, one, beam.contact)[:1]]
+            tries += [
+                t for one in found for t in _starts_with_one_more(base, one, beam.contact)[:1]
+            ]
     return tries
 
 
-def _without(fitted: Fit) -> list[Try]:
+def _sets_without_one(fitted: Fit) -> list[Try]:
     """Return the sets with one effect less."""
     return [
         (tuple(e for e in fitted.effects if e is not old), dict(fitted.values), fitted)
@@ -412,16 +435,16 @@ def _without(fitted: Fit) -> list[Try]:
     ]
 
 
-def _laws(beam: Beam, fitted: Fit, library: Sequence[Effect]) -> list[Try]:
-    """Return the sets with a law in place of one that it contains, or that contains it."""
+def _sets_with_other_law(beam: Beam, fitted: Fit, library: Sequence[Effect]) -> list[Try]:
+    """Return the sets with a law replaced by a law that it contains, or that contains it."""
     pairs = [(old, law) for old in fitted.effects for law in library]
-    return [one for old, law in pairs for one in _in_place(beam, fitted, old, law)]
+    return [one for old, law in pairs for one in _starts_with_other_law(beam, fitted, old, law)]
 
 
-def _in_place(beam: Beam, fitted: Fit, old: Effect, law: Effect) -> list[Try]:
-    """Return where fits of a law in place of a fitted one start.
+def _starts_with_other_law(beam: Beam, fitted: Fit, old: Effect, law: Effect) -> list[Try]:
+    """Return the starts of a law in place of a fitted law.
 
-    Their common numbers start as fitted. None where neither law contains the other.
+    Common parameters start at their fitted values. None if neither law contains the other.
     """
     rest = tuple(effect for effect in fitted.effects if effect is not old)
     wider = contains(law, old)
@@ -446,10 +469,10 @@ def _in_place(beam: Beam, fitted: Fit, old: Effect, law: Effect) -> list[Try]:
 
 
 def _fit_sets(beam: Beam, tries: Sequence[Try]) -> list[Fit]:
-    """Fit sets from their starts, a few steps first, and on where that may matter; add them.
+    """Fit sets from their starts, add them, and return the best fit of each set.
 
-    Return the best fit of each set. The second best start of a set goes on only where the best one
-    leaves an output over its limit.
+    All starts are fitted for a few evaluations. The best start of each set is then fitted to
+    convergence; a further start only if the best one leaves an output over its limit.
     """
     problem = beam.problem
     unique: dict[tuple[Names, tuple[tuple[str, float], ...]], Try] = {}
@@ -459,45 +482,45 @@ def _fit_sets(beam: Beam, tries: Sequence[Try]) -> list[Fit]:
     if not unique:
         return []
 
-    def begin(one: Try) -> Begun:
+    def start_fit(one: Try) -> Started:
         effects, start, parent = one
         fit = problem.fit(effects, start, parent, FIRST)
         return evidence(problem, fit, beam.variance).log(beam.counts), fit, parent
 
-    begun = sorted(in_threads(begin, list(unique.values())), key=lambda one: -one[0])
-    most = max(begun[0][0], beam.log(beam.best))
-    going = [one for one in begun if one[0] > most - BEGUN_BEHIND]
-    first: dict[Names, Begun] = {}
+    started = sorted(in_threads(start_fit, list(unique.values())), key=lambda one: -one[0])
+    most = max(started[0][0], beam.log(beam.best))
+    going = [one for one in started if one[0] > most - BEGUN_BEHIND]
+    first: dict[Names, Started] = {}
     for one in going:
         first.setdefault(names_of(one[1].effects), one)
-    _go_on(beam, list(first.values()))
+    _continue_fits(beam, list(first.values()))
 
-    def may_be_better(one: Begun) -> bool:
+    def may_be_better(one: Started) -> bool:
         names = names_of(one[1].effects)
         if one is first[names]:
             return False
-        if not may_be_true(problem, beam.fits[names]):
+        if not is_admissible(problem, beam.fits[names]):
             return True
         if one[0] < first[names][0] - GIVEN_UP:
             return False
         shown = {stage for effect in one[1].effects[-1:] for stage in effect.shows_in}
         return bool(problem.over_limit(beam.fits[names].rig) & shown)
 
-    _go_on(beam, [one for one in going if may_be_better(one)])
+    _continue_fits(beam, [one for one in going if may_be_better(one)])
     return [beam.fits[names] for names in first]
 
 
-def _go_on(beam: Beam, begun: Sequence[Begun]) -> None:
-    """Fit begun sets to the end by wide steps of the loader, and add them."""
+def _continue_fits(beam: Beam, started: Sequence[Started]) -> None:
+    """Fit started sets to convergence with coarse steps of the loader, and add them."""
     problem = beam.problem
-    if problem.case.tell is not None and begun:
-        problem.case.tell(f"fitting {len(begun)} sets of effects", 0, 1)
+    if problem.case.tell is not None and started:
+        problem.case.tell(f"fitting {len(started)} sets of effects", 0, 1)
 
-    def go_on(one: Begun) -> Fit:
+    def continue_fit(one: Started) -> Fit:
         _, fit, parent = one
-        return problem.fit(fit.effects, fit.values, parent, WIDE, fit)
+        return problem.fit(fit.effects, fit.values, parent, COARSE, fit)
 
-    for fit in in_threads(go_on, begun):
+    for fit in in_threads(continue_fit, started):
         beam.add(fit)
         names = names_of(fit.effects)
         if beam.fits[names] is fit:
@@ -506,7 +529,7 @@ def _go_on(beam: Beam, begun: Sequence[Begun]) -> None:
 
 
 def _finish(beam: Beam) -> None:
-    """Fit the leading sets by the loader's own steps."""
+    """Fit the leading sets to convergence with the loader's own steps."""
     problem = beam.problem
     ranked = [names for names in beam.leading() if names and names not in beam.finished]
 
@@ -521,17 +544,17 @@ def _finish(beam: Beam) -> None:
 
     for names, fits in zip(ranked, in_threads(finish, ranked), strict=True):
         beam.finished.add(names)
-        # A fit by wide steps is to another residual: it does not compete.
+        # A fit with coarse steps has another residual: its evidence is not comparable.
         del beam.fits[names], beam.known[names]
         for fit in fits:
             beam.add(fit)
     beam.recount()
 
 
-def _choice(beam: Beam, rounds: tuple[dict[str, float], ...]) -> Choice:
-    """Return the best set with each effect's posterior probability, and what may take its place.
+def _choose(beam: Beam, rounds: tuple[dict[str, float], ...]) -> Choice:
+    """Return the best set with each effect's posterior probability and its alternatives.
 
-    The probability of an effect is that of the sets that contain it, or a law that contains it.
+    The probability of an effect is the sum over the sets with it, or with a law that contains it.
     """
     ranked, best = beam.ranked(), beam.best
     fitted = beam.fits[best]
@@ -549,7 +572,7 @@ def _choice(beam: Beam, rounds: tuple[dict[str, float], ...]) -> Choice:
         rivals = tuple(
             Candidate(gain - (float(logs[0]) - beam.log(names)), other, beam.fits[names])
             for names in ranked
-            if beam.log(names) > logs[0] - RIVAL_GAIN and _in_its_place(best, names, effect)
+            if beam.log(names) > logs[0] - RIVAL_GAIN and _replaces(best, names, effect)
             for other in beam.fits[names].effects
             if other.name in names - best and not contains(other, effect)
         )
@@ -557,24 +580,24 @@ def _choice(beam: Beam, rounds: tuple[dict[str, float], ...]) -> Choice:
     base = beam.log(frozenset())
     tried = {next(iter(names)): beam.log(names) - base for names in beam.fits if len(names) == 1}
     steps.sort(key=lambda step: -step.gain)
-    return Choice(tuple(steps), fitted, beam.settled, tried, rounds, float(weights[0]))
+    return Choice(tuple(steps), fitted, beam.without_effects, tried, rounds, float(weights[0]))
 
 
-def _in_its_place(best: Names, other: Names, effect: Effect) -> bool:
-    """Tell whether another set has other effects in place of this one of the best set.
+def _replaces(best: Names, other: Names, effect: Effect) -> bool:
+    """Tell whether another set replaces an effect of the best set.
 
-    One takes the place of one, two of one, or one of two.
+    One effect replaces one or several, or several replace one.
     """
     gone, new = best - other, other - best
     return effect.name in gone and len(new) >= 1 and min(len(gone), len(new)) == 1
 
 
-def _with_contact_named(beam: Beam, choice: Choice, library: Sequence[Effect]) -> Choice:
-    """Return a choice with the law whose parameters include how the dry friction found yields.
+def _name_law_with_contact(beam: Beam, choice: Choice, library: Sequence[Effect]) -> Choice:
+    """Return a choice with presliding friction named, if its presliding length is not zero.
 
-    How friction yields is a nuisance parameter in the search (`distinct`). Where the rig file has
-    no friction, and the 95 % interval of its length excludes that of a rigid contact, the law with
-    these parameters is named.
+    Presliding parameters are nuisance parameters in the search (`distinct`). If the rig file has no
+    friction, and the 95 % interval of the presliding length excludes a rigid contact, the law that
+    includes these parameters replaces the law found.
     """
     problem, fitted = beam.problem, choice.fit
     case = problem.case
@@ -590,7 +613,7 @@ def _with_contact_named(beam: Beam, choice: Choice, library: Sequence[Effect]) -
         start = {law.value_key(p): float(value) for p, value in numbers.items()}
         effects = tuple(law if one is step.effect else one for one in fitted.effects)
         named = problem.fit(effects, {**fitted.values, **start}, None, OWN)
-        if may_be_true(problem, named):
+        if is_admissible(problem, named):
             steps = [replace(s, effect=law) if s is step else s for s in choice.steps]
             return replace(choice, steps=tuple(steps), fit=named)
     return choice

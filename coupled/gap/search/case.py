@@ -1,4 +1,4 @@
-"""What the search for effects works on: a rig, its outputs, and fits with the settings free."""
+"""The input of the search for effects: a nominal rig, its outputs and nuisance parameters."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from coupled.gap.search.contact import contact_start
 from coupled.gap.search.course import Bounds, Timing, timed
 from coupled.gap.search.found import Fit
 from coupled.gap.signals.output import Output, stage_gaps, stage_limits
-from coupled.gap.thresholds import HEARD_ANEW, SETTLE_FROM
+from coupled.gap.thresholds import LOWER_NOISE, SETTINGS_FROM
 from coupled.record.channels import ControlName
 from coupled.rig.rig import Rig
 
@@ -25,41 +25,43 @@ Tell = Callable[[str, int, int], None]
 
 @dataclass(frozen=True)
 class Case:
-    """What the search works on: a nominal rig, and the outputs of its records.
+    """A nominal rig, and the outputs of its records.
 
-    `refloored` gives the outputs with the floors of another rig; `timings` are of the effects that
-    begin within the record, and of all that free the same numbers, with the onsets as seen.
+    `outputs_with_noise_of` gives the outputs with noise floors estimated with another rig. If
+    `model_error_in_floors`, the floors include the error of the model of the healthy machine.
+    `timings` are (effect, timing, interval of the onset) of effects that begin within the record.
+    They apply to all effects that free the same parameters.
     """
 
     nominal: Rig
     control: ControlName
     outputs: Sequence[Output]
     tell: Tell | None = None
-    refloored: Callable[[Rig], Sequence[Output]] | None = None
-    only_wide: bool = False  # the floors hold the error of a model of the healthy machine
+    outputs_with_noise_of: Callable[[Rig], Sequence[Output]] | None = None
+    model_error_in_floors: bool = False
     timings: Sequence[tuple[Effect, Timing, Bounds]] = ()
 
     @cached_property
     def known(self) -> dict[str, Effect]:
-        """The nominal rig's settings, by the effects that free the same numbers.
+        """The nominal rig's nuisance parameters, by the effects that free the same parameters.
 
-        A sensor's setting that would drive an output beyond its limit, in which it is not fitted,
-        is fitted to that output, too. If it is the stamp of the force, the loader may have the
-        force late by itself, within one step.
+        A nuisance parameter of a sensor is fitted to its own outputs. If it could drive another
+        output over its limit, it is fitted to that output as well. If it is the time stamp of the
+        force, a delay of the force on the loader, up to one step, is free as well.
         """
         filed = settings(self.nominal, self.control, self.outputs)
         found = dict(filed)
         for name, one in filed.items():
-            spoiled = self._spoiled(one) if one.stage == "sensing" else ()
+            spoiled = self._driven_over_limit(one) if one.stage == "sensing" else ()
             if spoiled:
                 found[name] = replace(one, outputs=(*one.shows_in, *spoiled))
         if found.get(STAMP) not in (None, filed.get(STAMP)):
             found[LAG] = lag_within_a_step(self.nominal, self.control)
         return found
 
-    def _spoiled(self, setting: Effect) -> tuple[str, ...]:
-        """Return the outputs within their limits that a setting drives beyond them at an end."""
-        if not self._unsettled & {*setting.shows_in}:
+    def _driven_over_limit(self, setting: Effect) -> tuple[str, ...]:
+        """Return the outputs that a nuisance parameter at a bound drives over their limits."""
+        if not self._above_noise & {*setting.shows_in}:
             return ()
         (number,) = setting.free
         clean = [
@@ -81,52 +83,53 @@ class Case:
 
     @cached_property
     def settings(self) -> dict[str, Effect]:
-        """The settings that the outputs depend on, by name: nuisances of every fit."""
+        """The nuisance parameters that the outputs depend on, by name; free in every fit."""
         return {name: one for name, one in self.known.items() if self.is_open(one)}
 
     def is_open(self, effect: Effect) -> bool:
-        """Tell whether the rig as filed leaves a gap in an output in which an effect shows."""
-        return bool(self._unsettled & {*effect.shows_in})
+        """Tell whether an output in which an effect shows has a residual above the noise."""
+        return bool(self._above_noise & {*effect.shows_in})
 
     @cached_property
     def contact(self) -> tuple[Effect, ...]:
-        """How far dry friction yields: nuisances beside any."""
+        """The presliding parameters, which are nuisance parameters of any dry friction."""
         return contact(self.nominal, self.control)
 
     @cached_property
-    def _unsettled(self) -> set[str]:
-        """The outputs whose residual is large enough to settle anything by."""
-        return {output.stage for output in self.outputs if output.gap(self.nominal) > SETTLE_FROM}
+    def _above_noise(self) -> set[str]:
+        """The outputs whose residual with the nominal rig exceeds the noise floor."""
+        return {output.stage for output in self.outputs if output.gap(self.nominal) > SETTINGS_FROM}
 
     @cached_property
     def by_shots(self) -> Case | None:
-        """The case with outputs predicted by short replays; None where none has them."""
+        """The case with outputs predicted by multiple shooting; None if no output has it."""
         if not any(output.shots for output in self.outputs):
             return None
         return replace(self, outputs=[output.by_shots() for output in self.outputs])
 
     @cached_property
     def neutral(self) -> dict[str, float]:
-        """The settings as the rig file has them."""
+        """The nuisance parameters' values in the rig file, by "effect.parameter"."""
         every = (*self.known.values(), *self.contact)
         return {one.value_key(p): p.starts[0] for one in every for p in one.free}
 
     def ends(self, effect: Effect) -> tuple[float, float] | None:
-        """Return between which values an effect's number is a setting; None where it is none."""
+        """Return the tolerance limits of an effect's number; None if it has no tolerance."""
         setting = self.known.get(effect.name)
         return None if setting is None else (setting.free[0].low, setting.free[0].high)
 
     def gaps(self, rig: Rig) -> dict[str, float]:
-        """Return each stage's gap, by the floors of this rig where they are higher.
+        """Return each stage's gap, with the higher of the noise floors of the nominal and this rig.
 
-        As where a contact that yields lets noise pass that the filed friction would hold. What a
-        surface stands off from the filed aircraft's trim may be where another aircraft trims.
+        A rig with presliding friction, for example, passes noise that rigid friction would hold. If
+        the aircraft differs from the nominal one, its trim positions of the surfaces differ too,
+        and the smaller of the two gaps counts.
         """
         gaps, limits = stage_gaps(self.outputs, rig), stage_limits(self.outputs)
         narrow = all(gap <= limits[stage] for stage, gap in gaps.items())
-        if self.refloored is None or rig == self.nominal or narrow:
+        if self.outputs_with_noise_of is None or rig == self.nominal or narrow:
             return gaps
-        made = {(one.record, one.channel): one for one in self.refloored(rig)}
+        made = {(one.record, one.channel): one for one in self.outputs_with_noise_of(rig)}
         found: dict[str, float] = {}
         for one in self.outputs:
             new = made.get((one.record, one.channel), one)
@@ -138,37 +141,38 @@ class Case:
         return found
 
     def over_limit(self, rig: Rig) -> set[str]:
-        """Return the outputs of which a rig leaves more than noise may."""
+        """Return the outputs whose gap exceeds its limit with a rig."""
         limits = stage_limits(self.outputs)
         return {at for at, gap in self.gaps(rig).items() if gap > limits[at]}
 
-    def surely_open(self, settled: Rig) -> Case:
-        """Return the case in which a gap that no colour of noise explains is held to noise alone.
+    def without_colour_allowance(self, root: Rig) -> Case:
+        """Return the case without the allowance for unknown noise colour, where there is a gap.
 
-        What is not known of the colour of what drives a stage says whether it has a gap. Once it
-        has one, what effects leave of it is judged as anywhere else.
+        The colour of the input noise is uncertain, and this raises the limit of a stage (`unsure`).
+        The allowance decides only whether a stage has a gap. A gap over the raised limit with the
+        `root` rig, without effects, is then judged by the plain limit.
         """
         if not any(output.unsure for output in self.outputs):
             return self
-        settled_gaps, limits = stage_gaps(self.outputs, settled), stage_limits(self.outputs)
+        root_gaps, limits = stage_gaps(self.outputs, root), stage_limits(self.outputs)
         outputs = [
-            replace(one, unsure=0.0) if settled_gaps[one.stage] > limits[one.stage] else one
+            replace(one, unsure=0.0) if root_gaps[one.stage] > limits[one.stage] else one
             for one in self.outputs
         ]
         return replace(self, outputs=outputs)
 
-    def heard_anew(self, rig: Rig) -> Case | None:
-        """Return the case with the noise that a rig's residuals have; None where none is lower.
+    def with_lower_noise(self, rig: Rig) -> Case | None:
+        """Return the case with noise estimated from a rig's residuals; None if none is lower.
 
-        Noise is the same whatever the rig, and a gap adds to it what passes for coloured noise:
-        the least that any rig leaves is the nearest.
+        The noise does not depend on the rig, and a gap raises its estimate. The lowest estimate of
+        any rig is therefore the best.
         """
-        if self.refloored is None:
+        if self.outputs_with_noise_of is None:
             return None
-        made = {(one.record, one.channel): one for one in self.refloored(rig)}
+        made = {(one.record, one.channel): one for one in self.outputs_with_noise_of(rig)}
         anew = [made.get((one.record, one.channel), one) for one in self.outputs]
         pairs = list(zip(self.outputs, anew, strict=True))
-        quieter = [_is_quieter(new, old) for old, new in pairs]
+        quieter = [_has_lower_noise(new, old) for old, new in pairs]
         if not any(quieter):
             return None
         outputs = [
@@ -180,22 +184,22 @@ class Case:
         return replace(self, outputs=outputs)
 
     def timed(self, effect: Effect, timing: Timing, seen: Bounds) -> Case:
-        """Return the case with outputs in which an effect's size goes with time."""
+        """Return the case in whose outputs an effect has a time history; `seen`: its onset, s."""
 
         def ours(outputs: Sequence[Output]) -> list[Output]:
             given = (self.nominal, self.control, effect, timing)
             return [timed(o, *given) if o.stage in effect.shows_in else o for o in outputs]
 
-        before = self.refloored
+        before = self.outputs_with_noise_of
         return replace(
             self,
             outputs=ours(self.outputs),
-            refloored=None if before is None else lambda rig: ours(before(rig)),
+            outputs_with_noise_of=None if before is None else lambda rig: ours(before(rig)),
             timings=(*self.timings, (effect, timing, seen)),
         )
 
     def timing(self, effect: Effect) -> tuple[Timing, Bounds] | None:
-        """Return the timing of an effect that begins within the record; None of any other."""
+        """Return the timing of an effect that begins within the record; None for other effects."""
         keys = {p.key for p in effect.parameters}
         each = (
             (timing, seen, {p.key for p in one.parameters}) for one, timing, seen in self.timings
@@ -203,21 +207,21 @@ class Case:
         return next(((timing, seen) for timing, seen, timed in each if timed & keys), None)
 
     def with_only(self, found: Fit, effects: Sequence[Effect]) -> Rig:
-        """Return the rig with some of the effects that a fit found, and its nuisance parameters."""
+        """Return the rig with some effects of a fit, and the fitted nuisance parameters."""
         known = (*self.settings.values(), *self.contact)
         free = [one for one in known if one.value_key(one.free[0]) in found.values]
         rig = possible(self.nominal, self.control, (*effects, *free), found.values)
         return self.nominal if rig is None else rig
 
     def but_for_contact(self, values: Mapping[str, float]) -> dict[str, float]:
-        """Return fitted values without those of the contact, which a fit then seeks anew."""
+        """Return fitted values without the presliding parameters."""
         contact = {one.value_key(p) for one in self.contact for p in one.free}
         return {key: value for key, value in values.items() if key not in contact}
 
     def with_contact(
         self, effects: Sequence[Effect], free: Sequence[Effect], start: Mapping[str, float]
     ) -> dict[str, float]:
-        """Return where a fit starts, with the contact that leaves least where none is known."""
+        """Return start values, with presliding parameters from a grid search if none are given."""
         known = dict(start)
         if not self.contact or self.contact[0] not in free:
             return known
@@ -233,17 +237,16 @@ class Case:
             rig = possible(self.nominal, self.control, [*effects, *free], values)
             if rig is None:
                 return np.inf
-            each = [output.residual(rig, wide=True) for output in ours]
+            each = [output.residual(rig, coarse=True) for output in ours]
             return sum(float(np.mean(one**2)) for one in each)
 
         found = contact_start(left, *(number.high for number in numbers))
         return known | dict(zip(keys, found, strict=True))
 
 
-def _is_quieter(new: Output, old: Output) -> bool:
-    """Tell whether an output's noise is less as another rig has it, of what was measured alike.
+def _has_lower_noise(new: Output, old: Output) -> bool:
+    """Tell whether an output's noise estimate is lower with another rig, for the same measurement.
 
-    Where the elevator stands in trim is measured by a rig: with its play it is another place, and
-    may be known better.
+    A measured trim position of the elevator depends on the rig; then the measurements differ.
     """
-    return new.own < HEARD_ANEW * old.own and np.array_equal(new.measured, old.measured)
+    return new.own < LOWER_NOISE * old.own and np.array_equal(new.measured, old.measured)

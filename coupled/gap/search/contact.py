@@ -1,11 +1,11 @@
-"""Where a fit of a contact starts: how far dry friction yields, and what share of it is elastic.
+"""Start values of the presliding parameters: presliding length and elastic share.
 
-Where a control sticks depends on both, and with each little change it sticks elsewhere: least
-squares stay near where they begin. So a few lengths and shares are tried, and from the best of
-them a pattern search goes on (Hooke and Jeeves, J. ACM 8, 1961), which asks for no slopes.
+The positions in which a control sticks change with both parameters, so that the cost has many local
+minima, and least squares stay near their start. The start is therefore the best point of a grid,
+refined by a pattern search without derivatives (Hooke and Jeeves, J. ACM 8, 1961).
 
-Of friction that is filed the contact is a setting. How it yields is known no better than the
-physics of a right effect: that part of the gap which a rigid contact leaves may remain.
+If the rig file has friction, its presliding parameters are nuisance parameters. Their law has the
+model error of a right effect: a small share of the gap of a rigid contact may remain.
 """
 
 from __future__ import annotations
@@ -20,29 +20,29 @@ from coupled.gap.thresholds import ELASTIC_SHARES, LENGTHS, MISMATCH, SEARCHED_T
 from coupled.record.channels import ControlName
 from coupled.rig.rig import Rig
 
-Left = Callable[[float, float], float]  # what a length, d, and a share leave
+Cost = Callable[[float, float], float]  # mean square residual by a length, d, and a share
 
 
-def contact_start(left: Left, most: float, most_elastic: float) -> tuple[float, float]:
-    """Return the length, d, and the elastic share that leave least, up to the `most` of each."""
+def contact_start(cost: Cost, most: float, most_elastic: float) -> tuple[float, float]:
+    """Return the length, d, and elastic share of least cost, each up to its largest value."""
     known: dict[tuple[float, float], float] = {}
 
-    def leaves(at: tuple[float, float]) -> float:
+    def cost_at(at: tuple[float, float]) -> float:
         if at not in known:
-            known[at] = left(*at)
+            known[at] = cost(*at)
         return known[at]
 
     def within(length: float, share: float) -> tuple[float, float]:
         return min(max(length, 1e-3 * most), most), min(max(share, 0.0), most_elastic)
 
-    best = min((within(x * most, s) for x, s in product(LENGTHS, ELASTIC_SHARES)), key=leaves)
+    best = min((within(x * most, s) for x, s in product(LENGTHS, ELASTIC_SHARES)), key=cost_at)
     times, more = 1.5, 0.2
     while times - 1.0 > SEARCHED_TO:
         length, share = best
         longer = ((length * times, share), (length / times, share))
         softer = ((length, share + more), (length, share - more))
-        near = min((within(*step) for step in (*longer, *softer)), key=leaves)
-        if leaves(near) < leaves(best):
+        near = min((within(*step) for step in (*longer, *softer)), key=cost_at)
+        if cost_at(near) < cost_at(best):
             best = near
         else:
             times, more = times**0.5, 0.5 * more
@@ -50,7 +50,7 @@ def contact_start(left: Left, most: float, most_elastic: float) -> tuple[float, 
 
 
 def allowing_for_contact(output: Output, rig: Rig, control: ControlName) -> Output:
-    """Return an output of the loader with what the law of a contact that yields may leave of it."""
+    """Return an output with the gap that errors of the presliding law may cause (`mismatch`)."""
     if output.stage != "loader" or not is_dry(rig, control) or not contact(rig, control):
         return output
     return replace(output, mismatch=MISMATCH * max(output.gap(rig) - 1.0, 0.0))

@@ -1,21 +1,21 @@
-"""The course of an effect over time: since when it is there, and how fast it grows.
+"""The time history of an effect: its onset and its rate of growth.
 
-The size of an effect in a window of time is what part of its action the residual holds there, 1
-where it is as large as in all of the record (`credibility`). The action goes with the excitation,
-so a larger motion is no larger effect. Four courses are held against the sizes by least squares,
-each window weighing by its action's power:
+The size of an effect in a time window is the regression of the residual on the effect's action
+there, 1 if it is as large as in the whole record (`credibility`). The action scales with the
+excitation, so that a larger motion is no larger effect. Four time histories are fitted to the sizes
+by least squares, with the power of the action in each window as its weight:
 
     constant    1                     from     0, then 1 from t₀ on
     changes     α + β·t               grows    0, then β·(t − t₀) from t₀ on
 
-An effect whose number is a rate (a drift) is held against what it has grown to: t, and the last
-two. Of one that consists of events, as frames that were missed, the events themselves are counted,
-as Poisson's: an onset is there where the time before the first is too long for their rate.
+An effect whose parameter is a rate (a drift) is fitted with t, and the last two. Events, such as
+missed frames, are counted as a Poisson process: they have an onset if the time before the first is
+too long for their rate.
 
-An effect that begins within the record, at once or from nothing, is predicted with its time history
-(`Timing`): before its onset a stage is the rig without the effect, after it the rig with it, and
-between them what the effect does goes with its size. That is exact where a stage answers at once,
-as a linkage that bends, and to first order else.
+An effect that begins within the record, as a step or a ramp, is predicted with its time history
+(`Timing`): the prediction of the rig without the effect, plus the size times the change that the
+effect makes. This is exact for a stage without dynamics, such as a bending linkage, and correct to
+first order for other stages.
 """
 
 from __future__ import annotations
@@ -43,9 +43,9 @@ from coupled.record.channels import ControlName
 from coupled.rig.rig import Rig
 
 Floats = NDArray[np.float64]
-FEWEST_WINDOWS = 12  # by which a course is sought
-FINE = 61  # onsets of a ramp that are tried about the best
-ENDS = 3  # windows from either end of the record, within which no onset is sought
+FEWEST_WINDOWS = 12  # least number of windows for a time history other than constant
+FINE = 61  # onsets of the fine search about the best ramp
+ENDS = 3  # windows at either end of the record that are excluded as onsets
 Kind = Literal["constant", "changes", "from", "grows", "events"]
 
 
@@ -58,7 +58,7 @@ class Bounds:
     high: float
 
     def times(self, factor: float) -> Bounds:
-        """Return it in another unit."""
+        """Return the number and its interval times a factor."""
         ends = sorted((factor * self.low, factor * self.high))
         return Bounds(factor * self.value, *ends)
 
@@ -69,11 +69,12 @@ class Bounds:
 
 @dataclass(frozen=True)
 class Course:
-    """How an effect goes in time.
+    """The time history of an effect.
 
-    `onset_s` from the record's start, None where it was there from the first; `rate_per_s`: of the
-    effect's first number, in that number's unit a second, or of events, a second; None where it
-    does not grow; `then`: how large it is from its onset on, over its size in all of the record.
+    `onset_s` is the time from the record's start, None if the effect acts from the start.
+    `rate_per_s` is the rate of change of the effect's first parameter, in its unit per second, or
+    the rate of events, 1/s; None if constant. `then` is the size from the onset on, relative to the
+    size in the whole record.
     """
 
     kind: Kind
@@ -95,27 +96,28 @@ class Course:
 
 @dataclass(frozen=True)
 class _Law:
-    """A course fitted: what it leaves of the weighted sizes, its factor, with its error over σ."""
+    """A fitted time history: weighted residual, factor, and the factor's standard error over σ."""
 
     kind: Kind
-    left: Floats
+    residual: Floats
     factor: float
     error: float
     onset_s: float = 0.0
 
     @property
     def cost(self) -> float:
-        """The sum of squares that it leaves."""
-        return float(self.left @ self.left)
+        """The residual's sum of squares."""
+        return float(self.residual @ self.residual)
 
 
 def course_of(
     parts: Sequence[tuple[Floats, Floats]], rate_Hz: float, value: Bounds, gradual: bool
 ) -> Course:
-    """Return an effect's course by its `action` and what is `left` of the residual, in floors.
+    """Return the time history of an effect in one record.
 
-    `parts` are these two of each output, over the frames of one record; `value` is the effect's
-    first number less what does nothing. A number that is a rate is `gradual`.
+    `parts` are the effect's action and the residual of each output, in noise floors, over the
+    frames. `value` is the effect's first parameter less its neutral value. It is a rate if
+    `gradual`.
     """
     sizes, weights, times_s = _sizes(parts, rate_Hz)
     plain = Course("grows" if gradual else "constant", rate_per_s=value if gradual else None)
@@ -128,7 +130,7 @@ def course_of(
     if not gradual:
         others.append(_straight(times_s, sizes, weights))
     best = min(others, key=lambda law: law.cost)
-    count = len(sizes) / memory(best.left)
+    count = len(sizes) / memory(best.residual)
     changed = abs(best.factor) * times_s[-1] if best.kind == "changes" else math.inf
     gain = 0.5 * count * math.log(max(always.cost, 1e-300) / max(best.cost, 1e-300))
     if gain < COURSE_GAIN or changed < COURSE_CHANGES:
@@ -139,7 +141,7 @@ def course_of(
     factor = Bounds(best.factor, low, max(one.factor + sure * one.error for one in near))
     if best.kind == "changes":
         return Course(best.kind, rate_per_s=factor.times(value.value))
-    half_s = 0.5 * COURSE_WINDOW_s  # within a window nothing is known of an onset
+    half_s = 0.5 * COURSE_WINDOW_s  # the resolution of an onset
     first, last = (pick(one.onset_s for one in near) for pick in (min, max))
     onset = Bounds(best.onset_s, first - half_s, last + half_s)
     if best.kind == "from":
@@ -148,7 +150,7 @@ def course_of(
 
 
 def course_of_events(at_s: Floats, lasted_s: float) -> Course:
-    """Return the course of events at these times, s, in a record that lasts so long.
+    """Return the time history of events at given times, s, in a record of given length, s.
 
     The rate's interval is that of a Poisson count (Garwood 1936).
     """
@@ -161,22 +163,23 @@ def course_of_events(at_s: Floats, lasted_s: float) -> Course:
     rate = Bounds(count / over_s, float(low) / over_s, float(high) / over_s)
     if not waited:
         return Course("events", rate_per_s=rate)
-    # It began before the first event, by no more than such events let one wait.
+    # The onset precedes the first event by at most the 95 % quantile of the waiting time.
     begun = max(first - math.log(20.0) / rate.value, 0.0)
     return Course("events", Bounds(first, begun, first), rate)
 
 
 def _sizes(parts: Sequence[tuple[Floats, Floats]], rate_Hz: float) -> tuple[Floats, Floats, Floats]:
-    """Return sizes, weights and times in s of the windows that hold some of the action.
+    """Return sizes, weights and times, s, of the windows in which the effect acts.
 
-    A window's time is where its action lies.
+    A window's time is the centroid of its action.
     """
     frames = max(1, round(COURSE_WINDOW_s * rate_Hz))
     count = min(len(action) for action, _ in parts) // frames
     power, along, at = np.zeros(count), np.zeros(count), np.zeros(count)
     frame_s = np.arange(count * frames).reshape(count, frames) / rate_Hz
-    for action, left in parts:
-        a, r = (x[: count * frames].reshape(count, frames) for x in (action, action + left))
+    for action, residual in parts:
+        each = (action, action + residual)
+        a, r = (x[: count * frames].reshape(count, frames) for x in each)
         power += np.sum(a * a, axis=1)
         along += np.sum(a * r, axis=1)
         at += np.sum(a * a * frame_s, axis=1)
@@ -186,7 +189,7 @@ def _sizes(parts: Sequence[tuple[Floats, Floats]], rate_Hz: float) -> tuple[Floa
 
 
 def _law(kind: Kind, shape: Floats, sizes: Floats, weights: Floats, onset_s: float = 0.0) -> _Law:
-    """Return the course that goes as a shape, by the factor that leaves least."""
+    """Fit the factor of a time history of given shape."""
     root = np.sqrt(weights)
     power = max(float(np.sum(weights * shape**2)), 1e-300)
     factor = float(np.sum(weights * shape * sizes)) / power
@@ -194,25 +197,25 @@ def _law(kind: Kind, shape: Floats, sizes: Floats, weights: Floats, onset_s: flo
 
 
 def _ramp(times_s: Floats, sizes: Floats, weights: Floats, onset_s: float) -> _Law:
-    """Return what grows straight from a time on; its factor is the slope."""
+    """Fit a ramp from an onset; its factor is the slope."""
     return _law("grows", np.maximum(times_s - onset_s, 0.0), sizes, weights, onset_s)
 
 
 def _straight(times_s: Floats, sizes: Floats, weights: Floats) -> _Law:
-    """Return the course that changes straight in time; its factor is the slope."""
+    """Fit a straight line; its factor is the slope."""
     mean, middle = (float(np.average(x, weights=weights)) for x in (sizes, times_s))
     return _law("changes", times_s - middle, sizes - mean, weights)
 
 
 def _onsets(times_s: Floats, sizes: Floats, weights: Floats) -> list[_Law]:
-    """Return what begins at each time, some windows from either end of the record."""
+    """Fit a step and a ramp with each onset between windows."""
     found = []
     for k in range(ENDS, len(times_s) - ENDS):
         onset_s = 0.5 * float(times_s[k - 1] + times_s[k])
         begun = (times_s > onset_s).astype(np.float64)
         found.append(_law("from", begun, sizes, weights, onset_s))
         found.append(_ramp(times_s, sizes, weights, onset_s))
-    # Where a ramp begins is known better than to a window, and its slope depends on it.
+    # The onset of a ramp is better known than to one window, and its slope depends on it.
     best = min((law for law in found if law.kind == "grows"), key=lambda law: law.cost)
     near = best.onset_s + COURSE_WINDOW_s * np.linspace(-1.5, 1.5, FINE)
     found += [_ramp(times_s, sizes, weights, onset_s) for onset_s in near.tolist()]
@@ -220,22 +223,22 @@ def _onsets(times_s: Floats, sizes: Floats, weights: Floats) -> list[_Law]:
 
 
 def _near(one: _Law, best: _Law, count: float) -> bool:
-    """Tell whether a course is as likely as the best, to 95 %: twice the log ratio under χ²₁."""
+    """Tell whether a time history is within the 95 % likelihood region of the best (χ²₁)."""
     return count * math.log(max(one.cost, 1e-300) / max(best.cost, 1e-300)) <= 3.84
 
 
 @dataclass(frozen=True)
 class Timing:
-    """How large an effect is at a time, 1 where it is the largest.
+    """The relative size of an effect over time, at most 1: a step at `onset_s`, or a ramp from it.
 
-    It comes at `onset_s`, or, where it `grows`, straight from nothing then.
+    It is a ramp if it `grows`.
     """
 
     onset_s: float
     grows: bool
 
     def size(self, frames: int, rate_Hz: float) -> Floats:
-        """Return the size in each frame of a record, shape (frames,)."""
+        """Return the relative size in each frame of a record, shape (frames,)."""
         since = np.arange(frames) / rate_Hz - self.onset_s
         if not self.grows:
             return np.asarray((since >= 0.0).astype(np.float64))
@@ -243,9 +246,9 @@ class Timing:
         return np.asarray(grown / max(float(grown.max()), 1e-300))
 
     def course(self, seen: Bounds, lasted_s: float, value: Bounds) -> Course:
-        """Return the course of an effect fitted with this timing; `seen` is its onset.
+        """Return the time history of an effect fitted with this timing; `seen` is its onset, s.
 
-        `value` is the effect's first number where it is the largest, less what does nothing.
+        `value` is the largest value of the effect's first parameter, less its neutral value.
         """
         onset = Bounds(self.onset_s, min(self.onset_s, seen.low), max(self.onset_s, seen.high))
         if not self.grows:
@@ -254,9 +257,9 @@ class Timing:
 
 
 def timing_of(parts: Sequence[tuple[Floats, Floats]], rate_Hz: float) -> Timing:
-    """Return the timing that leaves least of what an effect explains.
+    """Return the timing of an effect with the least sum of squares.
 
-    `parts` are its action at one size and what that leaves, in floors, of each output.
+    `parts` are its action at constant size and the residual, in noise floors, of each output.
     """
     frames = min(len(action) for action, _ in parts)
     action = [a[:frames] for a, _ in parts]
@@ -276,7 +279,7 @@ def timing_of(parts: Sequence[tuple[Floats, Floats]], rate_Hz: float) -> Timing:
 
 
 def without(rig: Rig, nominal: Rig, control: ControlName, effect: Effect) -> Rig:
-    """Return a rig with the numbers that an effect frees as the nominal one has them."""
+    """Return a rig with the parameters of an effect at their nominal values."""
     filed = {p: value_of(nominal, control, p.key) for p in effect.parameters}
     return rig.changed({dotted(p.key_on(control), control): value for p, value in filed.items()})
 
@@ -284,7 +287,7 @@ def without(rig: Rig, nominal: Rig, control: ControlName, effect: Effect) -> Rig
 def timed(
     output: Output, nominal: Rig, control: ControlName, effect: Effect, timing: Timing
 ) -> Output:
-    """Return an output to whose prediction an effect is added as its timing has it."""
+    """Return an output whose prediction includes an effect with its timing."""
     size = timing.size(len(output.measured), output.frame_rate_Hz)
     known: list[tuple[Rig, Floats]] = []
 

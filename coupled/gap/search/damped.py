@@ -1,10 +1,9 @@
-"""Damped Gauss-Newton steps between bounds, that end where the residual's jumps hide the rest.
+"""Levenberg-Marquardt least squares between bounds, for residuals with small jumps.
 
-Each step is the least of the residual as its slopes foretell it, within the bounds, and damped
-(Levenberg 1944, Marquardt 1963; the damping goes by Nielsen, IMM-REP-1999-05). Friction, breakout
-and play move a residual by small jumps. Near the end a step gains no more than those, and shorter
-ones gain nothing that the record could tell: so a fit ends where little is foretold, or where two
-steps on end bring nothing of the little that they foretold.
+Each step minimises the linearised residual within the bounds, with damping (Levenberg 1944,
+Marquardt 1963; damping updated after Nielsen, IMM-REP-1999-05). Friction, breakout and play make
+the residual jump by small amounts. Near the minimum the predicted decrease is smaller than the
+jumps. The descent therefore ends at a small predicted decrease, or after several rejected steps.
 """
 
 from __future__ import annotations
@@ -17,13 +16,13 @@ from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from coupled.gap.thresholds import (
-    DAMPED_MORE,
+    DAMPING_FACTOR,
     DAMPING_FIRST,
     DAMPING_NEXT,
-    HOPELESS,
-    JUMPS_HIDE,
+    JUMPS_SHARE,
+    MOST_REJECTED,
     REACHED,
-    REFUSED,
+    REJECTED,
 )
 
 Floats = NDArray[np.float64]
@@ -31,18 +30,17 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Reached:
-    """Where the steps ended: numbers, residual, slopes, and how often the residual was asked for.
+    """The result of a descent: parameters, residual, Jacobian and residual evaluations.
 
-    `cost` is half the residual's sum of squares; `refused` says that steps which foretold more
-    brought nothing.
+    `cost` is half the residual's sum of squares. `rejected`: the last steps did not decrease it.
     """
 
     x: Floats
     cost: float
     fun: Floats
     jac: Floats
-    asked: int
-    refused: bool
+    evaluations: int
+    rejected: bool
 
 
 def descend(
@@ -53,61 +51,61 @@ def descend(
     most: int,
     enough: Callable[[Floats], float],
 ) -> Reached:
-    """Return the least of half a residual's sum of squares that is reached from the first numbers.
+    """Minimise half a residual's sum of squares from the first parameters, between bounds `ends`.
 
-    `residual` has shape (frames,), `slopes` (frames, numbers). It asks for residuals `most` times
-    at most. A step that foretells less than the share `enough` of the cost is the end, by the
-    residual there.
+    `residual` returns shape (frames,), `slopes` its Jacobian, (frames, parameters). At most `most`
+    residuals are evaluated. `enough` returns the relative decrease of the cost by the residual; the
+    descent ends at a smaller predicted decrease.
     """
     x = np.clip(first, *ends)
-    left, jacobian = residual(x), slopes(x)
-    cost, asked = 0.5 * float(left @ left), 1
-    damping, refused = DAMPING_FIRST, 0
-    share = enough(left)
-    # Slopes lead far beyond where a limit or a play stops to matter, and none leads back.
+    current, jacobian = residual(x), slopes(x)
+    cost, evaluations = 0.5 * float(current @ current), 1
+    damping, rejected = DAMPING_FIRST, 0
+    share = enough(current)
+    # Beyond a saturation (a limit, a play) the Jacobian vanishes: the step is limited.
     reach = max(float(np.linalg.norm(x)), 1.0)
     scale = np.linalg.norm(jacobian, axis=0)
-    while asked < most:
+    while evaluations < most:
         near = np.maximum(ends[0], x - reach), np.minimum(ends[1], x + reach)
-        step, foretold = _step(jacobian, left, x, near, damping, scale)
-        if foretold <= share * cost:
+        step, predicted = _step(jacobian, current, x, near, damping, scale)
+        if predicted <= share * cost:
             break
-        there = np.clip(x + step, *ends)
-        other = residual(there)
-        asked += 1
-        reached = 0.5 * float(other @ other)
-        gain = (cost - reached) / foretold
+        trial = np.clip(x + step, *ends)
+        trial_residuals = residual(trial)
+        evaluations += 1
+        reached = 0.5 * float(trial_residuals @ trial_residuals)
+        gain = (cost - reached) / predicted
         if gain <= 0.0:
-            refused += 1
-            if refused >= (REFUSED if foretold < JUMPS_HIDE * cost else HOPELESS):
+            rejected += 1
+            if rejected >= (REJECTED if predicted < JUMPS_SHARE * cost else MOST_REJECTED):
                 break
-            damping = max(DAMPED_MORE * damping, DAMPING_NEXT)
+            damping = max(DAMPING_FACTOR * damping, DAMPING_NEXT)
             continue
         little = cost - reached <= share * cost
-        x, left, cost, jacobian = there, other, reached, slopes(there)
-        share = enough(left)
+        x, current, cost, jacobian = trial, trial_residuals, reached, slopes(trial)
+        share = enough(current)
         scale = np.maximum(scale, np.linalg.norm(jacobian, axis=0))
         damping *= max(1.0 / 3.0, 1.0 - (2.0 * gain - 1.0) ** 3)
-        reach, refused = 2.0 * reach if gain > REACHED else reach, 0
+        reach, rejected = 2.0 * reach if gain > REACHED else reach, 0
         if little:
             break
-    return Reached(x, cost, left, jacobian, asked, refused > 0)
+    return Reached(x, cost, current, jacobian, evaluations, rejected > 0)
 
 
 def _step(
     jacobian: Floats,
-    left: Floats,
+    current: Floats,
     x: Floats,
     ends: tuple[Floats, Floats],
     damping: float,
     scale: Floats,
 ) -> tuple[Floats, float]:
-    """Return a damped step that stays between the ends, and by what it foretells the cost to fall.
+    """Return a damped step between the bounds, and the predicted decrease of the cost.
 
-    The slopes are brought to a triangle first, so that the bounded problem is a small one.
+    The Jacobian is reduced by a QR factorisation, so that the bounded problem is small.
     """
     base, triangle = np.linalg.qr(jacobian)
-    against = base.T @ left
+    against = base.T @ current
     sizes = np.where(scale > 0.0, scale, 1.0)
     rows = np.vstack((triangle / sizes, np.sqrt(damping) * np.eye(len(x))))
     wanted = np.concatenate((-against, np.zeros(len(x))))

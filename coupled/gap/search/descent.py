@@ -1,7 +1,7 @@
-"""How least squares go down to where a fit ends: by wide steps of the loader, then by its own.
+"""Least squares in two phases: with coarse steps of the loader, then with its own steps.
 
-Far from the end, and for slopes everywhere, wide steps do (`steps`); what the fit ends at makes the
-residual by the loader's own steps least.
+Coarse steps (`steps`) are enough far from the optimum, and for all derivatives. The second phase
+minimises the residual at the loader's own steps.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ from coupled.gap.search.damped import descend
 from coupled.gap.search.slopes import Ends, Floats, Slope, Slopes
 from coupled.gap.signals.output import memory
 from coupled.gap.thresholds import (
+    COARSE_DIFFERENCE,
     ENOUGH,
     FEWER,
     FIT_ITERATIONS,
     NOISE_LEFT,
     RACE_BEHIND,
     RACE_EVALUATIONS,
-    WIDE_DIFFERENCE,
 )
 
 Rows = NDArray[np.bool_] | slice
@@ -32,20 +32,20 @@ EVERY = slice(None)
 
 
 class Residual(Protocol):
-    """Scaled parameters' residual in floors, by wide steps of the loader where asked for.
+    """The residual in noise floors as a function of scaled parameters.
 
-    A `rough` one is to take slopes by.
+    `coarse`: with coarse steps of the loader. `rough`: approximate, for derivatives.
     """
 
-    def __call__(self, scaled: Floats, wide: bool = False, rough: bool = False) -> Floats:
-        """Return it, shape (frames,)."""
+    def __call__(self, scaled: Floats, coarse: bool = False, rough: bool = False) -> Floats:
+        """Return the residual, shape (frames,)."""
 
 
 @dataclass(frozen=True)
 class End:
-    """Where least squares end: scaled numbers, residual and Jacobian of the rows that were fitted.
+    """The result of least squares: scaled parameters, residual and Jacobian of the fitted rows.
 
-    `cost` is half the residual's sum of squares, `slope` what is known of all rows.
+    `cost` is half the residual's sum of squares, `slope` the Jacobian of all rows, if kept.
     """
 
     x: Floats
@@ -57,22 +57,21 @@ class End:
 
 @dataclass(frozen=True)
 class Descent:
-    """By which `steps` of the loader, and by how many evaluations at `most` with each.
+    """The options of a fit: its `steps` of the loader, and `most` evaluations in each phase.
 
-    By its `own` alone from a start that is near; by `wide` ones alone where the end is not needed.
-    `known` remembers what was fitted to the same outputs, so that none is fitted twice; `slopes`
-    are those of a fit to them that ended at the start, by the keys of its numbers. Of dry friction,
-    which `rubs`, the last steps along a valley gain what no record tells, and a fit ends sooner.
-    Slopes of `held` are taken over (`Slopes`): where the first of many starts is looked for.
+    Steps are `own` if the start is near the optimum, `coarse` if only a comparison is needed, or
+    `both`. `known` caches fits to the same outputs. `slopes` are Jacobians of a fit that ended at
+    the start, by its keys. For `dry` friction the fit stops at a larger gain per step: the last
+    steps gain less than the data can show. Columns of the Jacobian in `held` are reused (`Slopes`).
     """
 
-    steps: Literal["wide", "own", "both"] = "both"
+    steps: Literal["coarse", "own", "both"] = "both"
     most: int = FIT_ITERATIONS
     known: dict[Any, Any] | None = field(default=None, repr=False, compare=False)
     slopes: Mapping[tuple[str, ...], Slope | None] = field(
         default_factory=dict, repr=False, compare=False
     )
-    rubs: bool = False
+    dry: bool = False
     held: Floats | None = field(default=None, repr=False, compare=False)
 
     def end(
@@ -84,36 +83,36 @@ class Descent:
         rows: Rows = EVERY,
         slope: Slope | None = None,
     ) -> End:
-        """Return the least of some rows that is reached from several starts, between two `ends`.
+        """Return the best minimum of some rows from several starts, between the bounds `ends`.
 
-        Where nothing is `stepped` finer than the frames, all steps are alike. With a single start,
-        `slope` may be what another fit that ended there knew.
+        If nothing is `stepped` finer than the frames, the second phase is skipped. With a single
+        start, `slope` may be the Jacobian of another fit that ended there.
         """
-        near, sloping = partial(residual, wide=True), partial(residual, wide=True, rough=True)
+        near, sloping = partial(residual, coarse=True), partial(residual, coarse=True, rough=True)
         best: End | None = None
         if self.steps != "own" or not stepped:
-            share = WIDE_DIFFERENCE if stepped else 0.0
-            search = _Search(near, sloping, ends, rows, share, not stepped, self.rubs, self.held)
+            share = COARSE_DIFFERENCE if stepped else 0.0
+            search = _Search(near, sloping, ends, rows, share, not stepped, self.dry, self.held)
             best = self._raced(search, firsts, slope)
-        if self.steps != "wide" and stepped:
+        if self.steps != "coarse" and stepped:
             first, known = (firsts[0], slope) if best is None else (best.x, best.slope)
-            best = _Search(residual, sloping, ends, rows, rubs=self.rubs).down(
+            best = _Search(residual, sloping, ends, rows, dry=self.dry).down(
                 first, self.most, known
             )
         assert best is not None
         return best
 
     def _raced(self, search: _Search, firsts: Sequence[Floats], slope: Slope | None) -> End:
-        """Return the least that is reached; a start soon far behind the best is given up."""
+        """Return the best minimum; starts far behind after a few evaluations are dropped."""
         if len(firsts) == 1:
             return search.down(firsts[0], self.most, slope)
-        begun = [search.down(first, RACE_EVALUATIONS) for first in firsts]
-        begun.sort(key=lambda one: one.cost)
+        started = [search.down(first, RACE_EVALUATIONS) for first in firsts]
+        started.sort(key=lambda one: one.cost)
         if self.most <= RACE_EVALUATIONS:
-            return begun[0]
-        best = search.down(begun[0].x, self.most, begun[0].slope)
-        for other in begun[1:]:
-            behind = other.cost > RACE_BEHIND * begun[0].cost
+            return started[0]
+        best = search.down(started[0].x, self.most, started[0].slope)
+        for other in started[1:]:
+            behind = other.cost > RACE_BEHIND * started[0].cost
             if behind or leaves_noise(best.cost, len(best.fun)):
                 break
             best = min(best, search.down(other.x, self.most, other.slope), key=lambda one: one.cost)
@@ -124,13 +123,13 @@ WHOLE = Descent()
 
 
 def leaves_noise(cost: float, frames: int) -> bool:
-    """Tell whether half a sum of squares, floors², is that of so many frames of noise."""
+    """Tell whether half a sum of squares, noise floors², is that of noise alone."""
     return 2.0 * cost <= NOISE_LEFT**2 * frames
 
 
 @dataclass(frozen=True)
 class _Search:
-    """Least squares of some rows, by slopes that may be another residual's."""
+    """Least squares of some rows, with derivatives of a residual that may be approximate."""
 
     residual: Any
     sloping: Any
@@ -138,14 +137,14 @@ class _Search:
     rows: Rows
     share: float = 0.0
     smooth: bool = False
-    rubs: bool = False
+    dry: bool = False
     held: Floats | None = None
 
     def down(self, first: Floats, most: int, slope: Slope | None = None) -> End:
-        """Return where they lead from a start, by so many evaluations at most.
+        """Return the minimum from a start, with at most `most` evaluations.
 
-        Slopes that were corrected by much, or corrected and led nowhere, are taken anew at the end,
-        and may lead on.
+        If the Jacobian was corrected by much, or corrected and its steps were rejected, differences
+        are taken again at the end and the descent continues.
         """
         given = (self.rows, self.share, slope, self.smooth, self.held)
         slopes = Slopes(self.sloping, self.ends, *given)
@@ -153,8 +152,8 @@ class _Search:
         frames = int(np.count_nonzero(self.rows)) if isinstance(self.rows, np.ndarray) else 0
 
         def enough(left: Floats) -> float:
-            """Return the share of the cost that a step must gain, by what is left."""
-            times = min(memory(left), FEWER) if self.rubs else 1.0
+            """Return the least relative decrease of the cost that a step must make."""
+            times = min(memory(left), FEWER) if self.dry else 1.0
             return max(1e-5, ENOUGH * times / max(frames, 1000))
 
         def left(x: Floats) -> Floats:
@@ -162,8 +161,8 @@ class _Search:
 
         while True:
             found = descend(left, slopes, x0, self.ends, most, enough)
-            most -= found.asked
-            misled = found.refused and slopes.corrections > 0
+            most -= found.evaluations
+            misled = found.rejected and slopes.corrections > 0
             if (slopes.sure and not misled) or most < 1:
                 break
             slopes.renew()

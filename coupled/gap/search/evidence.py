@@ -1,4 +1,4 @@
-"""The criterion by which sets of effects are compared: the log evidence of a set, given the record.
+"""The criterion that ranks sets of effects: the log evidence of a set, given the record.
 
 For a set E of effects with parameters θ, nuisance parameters φ, and outputs o of N_o frames each:
 
@@ -7,24 +7,24 @@ For a set E of effects with parameters θ, nuisance parameters φ, and outputs o
     L_o  = −N_o/(2·τ_o)·m(q_o)        log-likelihood with N_o/τ_o effective samples
     q_o  = mean(r_o²)/v_o             r_o: residual over the noise floor, at the fitted parameters
     m(q) = ln q where q > 1           the residual's own variance is estimated: noise or misfit
-           q − 1 elsewhere            no residual is smaller than the noise that is known
-    v_o  = 1 + (ε·(g_o − 1))²         the physics' own error: ε of the residual without effects, g_o
+           q − 1 elsewhere            the residual cannot be smaller than the known noise
+    v_o  = 1 + (ε·(g_o − 1))²         model error: a share ε of the residual without effects, g_o
     ln P(E) = −Σ_effects (A + B·(parameters − 1))
     p(φ)    the Gaussian priors of the nuisance parameters, relative to their maximum
     H = Σ_o J_oᵀJ_o/(τ_o·max(q_o, 1))  information matrix of the log-likelihood
     S = diag(s)                       prior widths, so that s·√(2π) is 1/(prior density at the fit)
 
-Where the floor holds the error of a model of the healthy machine, which is no noise, a residual
-below it is no evidence, and q_o is 1 at least.
+If the noise floor includes the model error of the healthy machine, a residual below it is no
+evidence, and q_o is at least 1.
 
-The last term is Laplace's: how much of the prior volume the data leave. A size's prior is uniform
-in its logarithm over Λ = ln 10⁴, so s = |θ̂ − θ₀|·Λ/√(2π), with θ₀ where the effect does nothing; it
-is no less than that of the size's own standard error. The evidence is then the same in any unit.
-The prior of a nuisance parameter is its Gaussian, or uniform between its bounds.
+The last term is the Laplace approximation of the ratio of posterior to prior volume. The prior of a
+size is uniform in its logarithm over Λ = ln 10⁴, so s = |θ̂ − θ₀|·Λ/√(2π), with the neutral value
+θ₀; the size is taken as at least its standard error. The evidence is then independent of the unit.
+The prior of a nuisance parameter is Gaussian, or uniform between its bounds.
 
-τ_o is the integrated autocorrelation time (`memory`) of the residual of the set that leaves least
-of output o, the same for all sets: a worse set's longer memory is no reason to count its misfit
-less.
+τ_o is the integrated autocorrelation time (`memory`) of the smallest residual of output o in any
+set. It is the same for all sets, so that the longer correlation of a worse residual does not reduce
+its weight.
 
 MacKay, Information Theory, Inference, and Learning Algorithms (2003), ch. 28, has the theory.
 """
@@ -48,15 +48,15 @@ Floats = NDArray[np.float64]
 
 
 def misfit(square: Floats) -> Floats:
-    """Return −2 log-likelihood a sample of residuals with these mean squares, less that of 1."""
+    """Return −2 log-likelihood per sample of residuals of given mean square, less that of 1."""
     return np.where(square > 1.0, np.log(np.maximum(square, 1.0)), square - 1.0)
 
 
 @dataclass(frozen=True)
 class Evidence:
-    """What the evidence of a set consists of: `rest` are all terms but Σ L_o.
+    """The terms of a set's evidence: `rest` is the sum of all terms except Σ L_o.
 
-    `squares` are q_o, `samples` N_o/τ_o by the set's own residuals, shape (outputs,).
+    `squares` are q_o, `samples` N_o/τ_o from the set's own residuals, shape (outputs,).
     """
 
     squares: Floats
@@ -64,12 +64,12 @@ class Evidence:
     rest: float
 
     def log(self, samples: Floats) -> float:
-        """Return ln Z with so many effective samples of each output, shape (outputs,)."""
+        """Return ln Z with given effective samples of each output, shape (outputs,)."""
         return self.rest - 0.5 * float(samples @ misfit(self.squares))
 
 
 def fewest_unexplained(known: Sequence[Evidence]) -> Floats:
-    """Return N_o/τ_o, each by the set that leaves least of output o, shape (outputs,)."""
+    """Return N_o/τ_o from the smallest residual of each output o, shape (outputs,)."""
     squares = np.array([one.squares for one in known])
     counts = np.array([one.samples for one in known])
     return np.asarray(counts[np.argmin(squares, axis=0), np.arange(squares.shape[1])])
@@ -79,7 +79,7 @@ def evidence(problem: Problem, fitted: Fit, variance: Floats) -> Evidence:
     """Return the evidence of the set of a fit; `variance` is v_o, shape (outputs,)."""
     lefts = [output.residual(fitted.rig) for output in problem.outputs]
     squares = np.array([float(np.mean(left**2)) for left in lefts]) / variance
-    if problem.case.only_wide:
+    if problem.case.model_error_in_floors:
         squares = np.maximum(squares, 1.0)
     counts = np.array([len(left) / memory(left) for left in lefts])
     rest = sum(
@@ -95,7 +95,7 @@ def log_prior(effect: Effect) -> float:
 
 
 def _laplace(problem: Problem, members: Sequence[Effect], group: Group) -> float:
-    """Return Laplace's term of the parameters that were fitted together."""
+    """Return the Laplace term of the parameters of one group."""
     if not group.values or not group.low:
         return 0.0
     numbers = {one.value_key(p): p for one in members for p in one.free}
@@ -126,7 +126,7 @@ def _width(problem: Problem, p: Parameter, group: Group, key: str) -> float:
 def likelier_by(outputs: Sequence[Output], right: Fit, wrong: Fit) -> float:
     """Return the log-likelihood by which the `right` fit of whole records beats the `wrong` one.
 
-    Effective samples are counted by the autocorrelation time of what the right one leaves.
+    Effective samples follow from the autocorrelation time of the right fit's residual.
     """
     gain = 0.0
     for output in outputs:

@@ -33,7 +33,7 @@ from coupled.gap.effects.settings import CONTACT
 from coupled.gap.search.case import Case
 from coupled.gap.search.descent import WHOLE, Descent, End
 from coupled.gap.search.found import Fit, Group
-from coupled.gap.search.intervals import half_width, least_of, open_above, worth_of
+from coupled.gap.search.intervals import cost_of_unit_likelihood, half_width, least_of, open_above
 from coupled.gap.search.slopes import Slope
 from coupled.gap.signals.output import Output, Part, memory
 from coupled.gap.thresholds import FIT_LEGS, WEIGHT_CHANGED
@@ -43,7 +43,7 @@ from coupled.rig.rig import Rig
 
 Floats = NDArray[np.float64]
 Normal = tuple[float, float]  # mean and standard deviation
-_FAR = 1e6  # noise floors: the residual of a rig that the physics cannot give
+_FAR = 1e6  # noise floors: the residual of values that give no valid rig
 
 
 def fit_set(
@@ -58,10 +58,10 @@ def fit_set(
 ) -> Fit:
     """Return the effects fitted to a part of the record, with the nuisance parameters free.
 
-    A fit starts from each parameter's own starts, or from `start` where it has a value, and keeps
-    the best. Effects that share no output are fitted apart; of `parent` the groups that are the
-    same, and start where they ended, are taken over. A rig that the physics cannot give has all its
-    parameters at a bound.
+    A fit starts from each parameter's own starts, or from its value in `start`, and the best
+    minimum is kept. Effects that share no output are fitted separately. Groups of `parent` that are
+    the same, and start at their optimum, are reused. If the values give no valid rig, all
+    parameters are at a bound.
     `priors` are (mean, standard deviation) by "effect.parameter", in the parameters' own units.
     """
     every = [*effects, *nuisances]
@@ -119,14 +119,14 @@ def _remembered(
     parent: Fit | None,
     part: Part,
 ) -> Group:
-    """Return a fit, as it is known; one that starts where another ended is that one."""
+    """Return a fit from the cache; a fit that starts at the optimum of another one is that fit."""
     ours, known = touched(case.outputs, members), descent.known
     if descent.most < WHOLE.most and parent is not None:
         descent = replace(descent, held=_held(case, ours, _free(members)[0], parent))
     if known is None:
         return _fit(case, ours, members, priors, start, descent, part)
-    wide = any(output.stepped for output in ours) and descent.steps == "wide"
-    what = (tuple(members), wide, descent.most, part)
+    coarse = any(output.stepped for output in ours) and descent.steps == "coarse"
+    what = (tuple(members), coarse, descent.most, part)
     key = (*what, tuple(map(tuple, _starts(members, start))))
     if key not in known:
         known[key] = found = _fit(case, ours, members, priors, start, descent, part)
@@ -136,9 +136,9 @@ def _remembered(
 
 
 def _held(case: Case, ours: Sequence[Output], keys: Sequence[str], parent: Fit) -> Floats | None:
-    """Return the slopes that a parent's fit ended with, NaN for parameters that it lacks.
+    """Return the Jacobian of a parent's fit, NaN in the columns of parameters that it lacks.
 
-    Its shape is (frames, parameters). None where it has none of them.
+    Its shape is (frames, parameters). Return None if the parent has none of the parameters.
     """
     edges = np.cumsum([0, *(len(output.measured) for output in ours)]).tolist()
     rows = {id(one): slice(*ends) for one, ends in zip(ours, pairwise(edges), strict=True)}
@@ -168,7 +168,7 @@ def _fit(
     part: Part = "all",
     legs: int = FIT_LEGS,
 ) -> Group:
-    """Return a fit; by the loader's own steps it goes on until its weights are those of its end."""
+    """Return a fit; repeat a fit at the loader's own steps until its weights are consistent."""
     nominal, control = case.nominal, case.control
     keys, frees = _free(effects)
     if not ours:
@@ -177,21 +177,21 @@ def _fit(
     scale = np.array([_scale(p) for p in frees])
     frames = [int(np.count_nonzero(output.rows(part))) for output in ours]
 
-    def plain(scaled: Floats, wide: bool = False, rough: bool = False) -> list[Floats]:
+    def plain(scaled: Floats, coarse: bool = False, rough: bool = False) -> list[Floats]:
         go_on()
         values = dict(zip(keys, (scaled * scale).tolist(), strict=True))
         rig = possible(nominal, control, effects, values)
         if rig is None:
             return [np.full(count, _FAR) for count in frames]
-        return [output.residual(rig, part, wide, rough) for output in ours]
+        return [output.residual(rig, part, coarse, rough) for output in ours]
 
     firsts = [np.array(first) / scale for first in _starts(effects, start)]
-    begun = plain(firsts[0], wide=True)
+    begun = plain(firsts[0], coarse=True)
     squares = _squares(ours, begun)
     weights = [math.sqrt(min(squares) / one) for one in squares]
 
-    def residual(scaled: Floats, wide: bool = False, rough: bool = False) -> Floats:
-        lefts = zip(plain(scaled, wide, rough), weights, strict=True)
+    def residual(scaled: Floats, coarse: bool = False, rough: bool = False) -> Floats:
+        lefts = zip(plain(scaled, coarse, rough), weights, strict=True)
         return np.concatenate([weight * left for left, weight in lefts])
 
     if not keys:
@@ -202,18 +202,18 @@ def _fit(
     stepped = any(output.stepped for output in ours)
     unit = min(_unit(left) for left in begun)
     prior = _Priors.of([priors.get(key) for key in keys], scale, unit)
-    # How the contact of dry friction yields is free beside any friction that is filed.
-    rubs = any(one.dry for one in effects) or any(p.key in CONTACT for p in frees)
+    # The presliding parameters are free if the rig file has dry friction.
+    dry = any(one.dry for one in effects) or any(p.key in CONTACT for p in frees)
 
-    def with_prior(scaled: Floats, wide: bool = False, rough: bool = False) -> Floats:
-        return np.concatenate((residual(scaled, wide, rough), prior.rows(scaled)))
+    def with_prior(scaled: Floats, coarse: bool = False, rough: bool = False) -> Floats:
+        return np.concatenate((residual(scaled, coarse, rough), prior.rows(scaled)))
 
     rows = np.repeat(weights, frames)
     before, held = descent.slopes.get(tuple(keys)), descent.held
     slope = None if before is None else prior.in_slope(before, rows)
     if held is not None:
         held = np.vstack((rows[:, None] * held, prior.slopes))
-    search = replace(descent, rubs=rubs, held=held)
+    search = replace(descent, dry=dry, held=held)
     best = prior.without(search.end(with_prior, firsts, (low, high), stepped, slope=slope))
 
     def cost(at: float, k: int) -> float:
@@ -229,7 +229,7 @@ def _fit(
             best = min(best, prior.without(found), key=lambda one: one.cost)
     free = _Free(keys, frees, scale, ends, weights, frames)
     changed = _changed(squares, best, free, ours)
-    if legs > 1 and descent.steps != "wide" and changed > WEIGHT_CHANGED:
+    if legs > 1 and descent.steps != "coarse" and changed > WEIGHT_CHANGED:
         again = dict(zip(keys, (best.x * scale).tolist(), strict=True))
         rest = replace(descent, slopes={})
         return _fit(case, ours, effects, priors, again, rest, part, legs - 1)
@@ -239,17 +239,17 @@ def _fit(
 
 
 class Cost(Protocol):
-    """Half the sum of squares of a fit with scaled parameter `k` elsewhere."""
+    """Half the sum of squares of a fit with another value of scaled parameter `k`."""
 
     def __call__(self, at: float, k: int) -> float:
-        """Return it with the parameter at `at`."""
+        """Return half the sum of squares with the parameter at `at`."""
 
 
 @dataclass(frozen=True)
 class _Free:
-    """The free parameters of a fit: their keys, and what scales them; `ends` are their bounds.
+    """The free parameters of a fit: keys, scales, and `ends`, their bounds.
 
-    `weights` are those of the outputs' residuals, and `frames` how many each has.
+    `weights` are the weights of the outputs' residuals, `frames` their numbers of frames.
     """
 
     keys: list[str]
@@ -260,7 +260,7 @@ class _Free:
     frames: list[int]
 
     def parts(self) -> Iterator[tuple[slice, float]]:
-        """Yield each output's rows of a fit, and their weight."""
+        """Yield the rows of each output in a fit, and their weight."""
         edges = np.cumsum([0, *self.frames]).tolist()
         for (first, last), weight in zip(pairwise(edges), self.weights, strict=True):
             yield slice(first, last), weight
@@ -274,27 +274,27 @@ def _group(
     prior: _Priors,
     cost: Cost,
 ) -> Group:
-    """Return a fit that ended: its values with their intervals, and which are at a bound.
+    """Return the values of a converged fit, with their intervals, and which are at a bound.
 
-    `stretches` number the rows' stretches, `cost` is that with one parameter elsewhere.
+    `stretches` is the stretch number of each row, `cost` the cost with one parameter changed.
     """
     (low, high), scale = free.ends / free.scale, free.scale
     outputs = len(free.frames)
     half = half_width(best, outputs, stretches, prior.precision) * scale
-    # Where all that is filed is taken off, nothing is left of it: that is an answer.
+    # A lower bound at which nothing is left of the filed value is a valid result, not a bound.
     gone = np.isclose(best.x, low, atol=1e-4) & (free.ends[0] < [p.low for p in free.numbers])
     values = np.where(gone, free.ends[0], best.x * scale)
     pairs = zip(free.numbers, values, strict=True)
     half = np.hypot(half, [p.error(v, case.nominal, case.control) for p, v in pairs])
-    # A small cubic is near its bound on the scale of a large one, but known not to be there.
+    # A small value may be near its bound on the scale of the start, but differ significantly.
     small = np.isclose(best.x, low, atol=1e-4) & ((best.x - low) * scale <= half)
     stuck = small | np.isclose(best.x, high, rtol=1e-4)
     stuck &= ~np.array([p.may_end for p in free.numbers]) & ~gone
-    # Of a limit that the records do not meet, nothing is known, and the others stand without it.
+    # A limit that is never reached is undetermined; this does not invalidate the other parameters.
     stuck |= ~np.isfinite(half) & ~np.array([p.may_end and p.inverse for p in free.numbers])
     lower, upper = values - half, values + half
     for k in (k for k, p in enumerate(free.numbers) if p.saturates):
-        span, unit = (float(low[k]), float(high[k])), worth_of(best, outputs)
+        span, unit = (float(low[k]), float(high[k])), cost_of_unit_likelihood(best, outputs)
         open_one = open_above(partial(cost, k=k), float(best.x[k]), span, unit)
         if open_one is not None:
             values[k], lower[k], upper[k] = open_one[0] * scale[k], open_one[1] * scale[k], np.inf
@@ -312,7 +312,7 @@ def _group(
 
 
 def _unit(left: Floats) -> float:
-    """Return the part of a residual's sum of squares that is one unit of −2 log-likelihood."""
+    """Return the sum of squares that is one unit of −2 log-likelihood."""
     return max(float(np.mean(left**2)), 1.0) * memory(left)
 
 
@@ -327,16 +327,16 @@ def _squares(outputs: Sequence[Output], lefts: Sequence[Floats]) -> list[float]:
 
 
 def _changed(squares: Sequence[float], end: End, free: _Free, outputs: Sequence[Output]) -> float:
-    """Return by what factor the channels' mean squares changed most in a weighted fit."""
+    """Return the largest factor by which a channel's mean square changed in a weighted fit."""
     ended = _squares(outputs, [end.fun[rows] / weight for rows, weight in free.parts()])
     return max(max(a / b, b / a) for a, b in zip(squares, ended, strict=True))
 
 
 def _plain(slope: Slope | None, weights: Floats) -> Slope | None:
-    """Return a weighted fit's slopes without the weights of the rows, and without priors' rows."""
+    """Return a weighted fit's Jacobian without the rows' weights and the priors' rows."""
     if slope is None:
         return None
-    left, jacobian = slope.left[: len(weights)], slope.jacobian[: len(weights)]
+    left, jacobian = slope.residual[: len(weights)], slope.jacobian[: len(weights)]
     return Slope(slope.at, left / weights, jacobian / weights[:, None])
 
 
@@ -364,7 +364,7 @@ class _Priors:
 
     @classmethod
     def of(cls, each: Sequence[Normal | None], scale: Floats, unit: float) -> _Priors:
-        """Return the priors of parameters, None for one that has none."""
+        """Return the priors of parameters; None in `each` for a parameter without a prior."""
         known = [(k, prior) for k, prior in enumerate(each) if prior is not None]
         at = np.array([k for k, _ in known], dtype=np.intp)
         mean = np.array([prior[0] for _, prior in known]) / scale[at]
@@ -372,30 +372,30 @@ class _Priors:
         return cls(at, mean, sigma, len(each), unit)
 
     def rows(self, scaled: Floats) -> Floats:
-        """Return the rows of the least squares, one a prior."""
+        """Return the residual rows of the priors."""
         return np.asarray(np.sqrt(self.unit) * (scaled[self.at] - self.mean) / self.sigma)
 
     @property
     def precision(self) -> Floats:
-        """1/variance of each scaled parameter before the data, 0 without a prior."""
+        """1/variance of each scaled parameter's prior, 0 without a prior."""
         found = np.zeros(self.numbers)
         found[self.at] = self.sigma**-2.0
         return found
 
     def penalty(self, scaled: Floats) -> float:
-        """Return by how much the log density of the priors is below its maximum."""
+        """Return the log density of the priors below its maximum."""
         return 0.5 * float(np.sum(((scaled[self.at] - self.mean) / self.sigma) ** 2))
 
     @property
     def slopes(self) -> Floats:
-        """The rows' slopes, shape (rows, numbers)."""
+        """The Jacobian of the rows, shape (rows, parameters)."""
         found = np.zeros((len(self.at), self.numbers))
         found[np.arange(len(self.at)), self.at] = np.sqrt(self.unit) / self.sigma
         return found
 
     def in_slope(self, slope: Slope, weights: Floats) -> Slope:
-        """Return another fit's slopes, its rows weighted, with the rows of these priors."""
-        left = np.concatenate((weights * slope.left, self.rows(slope.at)))
+        """Return another fit's Jacobian with weighted rows, and the rows of these priors."""
+        left = np.concatenate((weights * slope.residual, self.rows(slope.at)))
         return Slope(slope.at, left, np.vstack((weights[:, None] * slope.jacobian, self.slopes)))
 
     def without(self, end: End) -> End:
@@ -407,19 +407,19 @@ class _Priors:
 
 
 def _with(x: Floats, k: int, at: float) -> Floats:
-    """Return scaled numbers with another in place of one."""
+    """Return scaled parameters with one of them at another value."""
     other = x.copy()
     other[k] = at
     return other
 
 
 def _scale(p: Parameter) -> float:
-    """Return a size of a parameter for which a step of a hundredth is small."""
+    """Return the scale of a parameter, of which a hundredth is a small step."""
     return max(abs(start) for start in p.starts) or 0.5 * (p.high - p.low)
 
 
 def _free(effects: Sequence[Effect]) -> tuple[list[str], list[Parameter]]:
-    """Return the keys and parameters that a fit frees; of two of one number, the first."""
+    """Return the keys and parameters that a fit frees; of two of one rig key, the first."""
     owners: dict[str, tuple[str, Parameter]] = {}
     for effect in effects:
         for p in effect.free:

@@ -1,4 +1,4 @@
-"""What a search found: fits, the best set of effects, and what may take each effect's place."""
+"""The results of a search: fits, the best set of effects, and the alternatives of each."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class Fit:
 
 @dataclass(frozen=True)
 class Candidate:
-    """An effect that may take another's place, its gain in log evidence, and the set's fit."""
+    """An alternative to an effect, its gain in log evidence, and the fit of its set."""
 
     gain: float
     effect: Effect
@@ -66,8 +66,8 @@ class Candidate:
 class Found:
     """One effect of the best set.
 
-    `gain` is the log evidence that is lost without it, `probability` that of all sets that contain
-    it, `rivals` the effects that take its place in sets within `RIVAL_GAIN` of the best.
+    `gain` is the log evidence lost without the effect, `probability` the sum over all sets that
+    contain it, `rivals` its alternatives in sets within `RIVAL_GAIN` of the best.
     """
 
     effect: Effect
@@ -78,16 +78,16 @@ class Found:
 
 @dataclass(frozen=True)
 class Choice:
-    """What a search found: the effects of the best set, and their fit.
+    """The effects of the best set, and their fit.
 
-    `settled` is the fit without effects, its nuisance parameters within their tolerance; `tried`
-    the gain in log evidence of each effect alone, `rounds` that of the sets of each depth, by the
+    `without_effects` is the fit of the nuisance parameters alone, within their tolerance. `tried`
+    is the gain in log evidence of each effect alone, `rounds` that of each depth's sets by the
     effect added, `probability` the posterior probability of the best set.
     """
 
     steps: tuple[Found, ...]
     fit: Fit
-    settled: Fit
+    without_effects: Fit
     tried: dict[str, float] = field(default_factory=dict)
     rounds: tuple[dict[str, float], ...] = ()
     probability: float = 1.0

@@ -22,22 +22,24 @@ from coupled.gap.signals.output import Floats, explained_below, stage_limits
 from coupled.gap.thresholds import BEGUN, LATER_LEFT, LATER_TRIED, COURSE_WINDOW_s
 from coupled.record.record import Record
 
-Parts = list[tuple[Floats, Floats]]  # of each output, what the effect does, and what is left
+Parts = list[tuple[Floats, Floats]]  # action of an effect and residual, of each output
 
 
 def search(case: Case, library: Sequence[Effect]) -> tuple[Case, Choice]:
     """Return the effects that explain a record's gap, and the case with its last noise floors."""
     found = search_sets(case, library)
-    while (later := _later(*found, library)) is not None:
+    while (later := _search_with_onset(*found, library)) is not None:
         found = later
     return found
 
 
-def _later(case: Case, found: Choice, library: Sequence[Effect]) -> tuple[Case, Choice] | None:
-    """Return the search with an effect that begins in the record, where that explains far more.
+def _search_with_onset(
+    case: Case, found: Choice, library: Sequence[Effect]
+) -> tuple[Case, Choice] | None:
+    """Repeat the search with an effect that begins within the record, if that explains far more.
 
-    The other effects found may only compensate for what the time history explains. One that grows
-    late may gain nothing as a constant: without any effect found, those that did best are tried.
+    Other effects of the set may only compensate for the missing time history. An effect that grows
+    late may gain nothing as a constant: if no effect was found, the best single effects are tried.
     """
     open_outputs = _open_outputs(case, found)
     gains = {step.effect.name: step.gain for step in found.steps} or found.tried
@@ -55,7 +57,7 @@ def _later(case: Case, found: Choice, library: Sequence[Effect]) -> tuple[Case, 
 
 def _open_outputs(case: Case, choice: Choice) -> set[str]:
     """Return the outputs of which the effects found leave more than noise and physics' error."""
-    first, limits = case.gaps(choice.settled.rig), stage_limits(case.outputs)
+    first, limits = case.gaps(choice.without_effects.rig), stage_limits(case.outputs)
     left = case.gaps(choice.fit.rig)
     return {at for at, gap in left.items() if gap > explained_below(first[at], limits[at])}
 
@@ -66,10 +68,10 @@ def _left(case: Case, choice: Choice) -> float:
 
 
 def course_in(effect: Effect, case: Case, found: Fit, records: list[Record]) -> Course | None:
-    """Return the course of an effect in the record that holds most of its action.
+    """Return the time history of an effect in the record with most of its action.
 
-    None of an effect without a number, of one of several records whose course is the same all the
-    time, and of a limit, whose action does not go with its size.
+    Return None for a discrete effect, for a limit, whose action is not proportional to its size,
+    and for an effect without action.
     """
     if not effect.free:
         return None
@@ -91,10 +93,10 @@ def course_in(effect: Effect, case: Case, found: Fit, records: list[Record]) -> 
 
 
 def in_time(effect: Effect, case: Case) -> Case | None:
-    """Return the case with an effect that begins within the one record, at once or straight.
+    """Return the case with the time history of an effect that begins within the one record.
 
-    None where it was there from the first, or has no size. The effect is fitted alone: others may
-    only have taken up what its course leaves.
+    None if the effect acts from the start, or has no size. The effect is fitted alone, since other
+    effects may have absorbed the error of a constant size.
     """
     number = effect.free[0] if effect.free else None
     sized = number is not None and not number.inverse and not effect.gradual
@@ -108,17 +110,17 @@ def in_time(effect: Effect, case: Case) -> Case | None:
     ((_, ours),) = parts.items()
     rate_Hz = case.nominal.frame_rate
     seen = course_of(ours, rate_Hz, _size(effect, case, alone), effect.gradual)
-    # What changes from the first may be anything that drifts: it is said, and no cause.
+    # A change from the record's start may be any drift: it is reported, and not taken as a cause.
     if seen.onset_s is None or seen.onset_s.low < BEGUN * COURSE_WINDOW_s:
         return None
     anew = case.timed(effect, timing_of(ours, rate_Hz), seen.onset_s)
-    # By what it does at its true size: friction and play do not go straight with theirs.
+    # Estimate again at the fitted size: friction and play are not linear in their size.
     ((_, ours),) = _parts(effect, case, Problem(anew).fit((effect,))).items()
     return case.timed(effect, timing_of(ours, rate_Hz), seen.onset_s)
 
 
 def _parts(effect: Effect, case: Case, found: Fit) -> dict[int, Parts]:
-    """Return {record: what an effect does there in each output, and what is left}, in floors."""
+    """Return {record: (action of an effect, residual) of each output}, in noise floors."""
     without = case.with_only(found, [other for other in found.effects if other is not effect])
     parts: dict[int, Parts] = {}
     for output in touched(case.outputs, [effect]):
@@ -129,7 +131,7 @@ def _parts(effect: Effect, case: Case, found: Fit) -> dict[int, Parts]:
 
 
 def _size(effect: Effect, case: Case, found: Fit) -> Bounds:
-    """Return an effect's first number, less what does nothing."""
+    """Return an effect's first parameter less its neutral value, with its 95 % interval."""
     first = effect.free[0]
     key, nothing = effect.value_key(first), first.neutral(case.nominal, case.control)
     each = (bound.get(key, np.nan) for bound in (found.values, found.low, found.high))

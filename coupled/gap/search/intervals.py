@@ -1,9 +1,9 @@
-"""How well a fit's numbers are known: the wider of two 95 % intervals.
+"""Confidence intervals of fitted parameters: the wider of two 95 % intervals.
 
-White residuals widened by their memory count every frame; the scatter of the score from stretch to
-stretch (the sandwich; White, Econometrica 48, 1980) counts misfit wherever it sits, and needs more
-stretches than there are numbers. Where a record is short, its stretches are therefore cut, down to
-parts that hold many times the residual's memory.
+The first assumes a stationary residual with a correlation time. The second is the sandwich
+estimator from the scatter of the score between stretches (White, Econometrica 48, 1980); it
+includes misfit, and needs more stretches than parameters. The stretches of a short record are
+therefore divided into parts much longer than the residual's correlation time (`memory`).
 """
 
 from __future__ import annotations
@@ -23,11 +23,10 @@ Numbers = NDArray[np.intp]
 
 
 def half_width(found: End, outputs: int, groups: Numbers, known: Floats) -> Floats:
-    """Return half of each scaled parameter's 95 % interval; infinite where nothing determines it.
+    """Return half of each scaled parameter's 95 % interval; infinite if it is undetermined.
 
-    The larger of two: white residuals widened by their memory, and the scatter of the score from
-    stretch to stretch (the sandwich), which counts misfit wherever it sits. `known` is what is
-    known beforehand, 1/variance: of a setting, that it is anywhere within its tolerance.
+    The larger of two: from the residual's variance and correlation time, and from the sandwich
+    estimator. `groups` are the stretch numbers of the rows, `known` the 1/variance of the priors.
     """
     jacobian, left = found.jac, found.fun
     variance, widen = _counted(left, outputs)
@@ -50,11 +49,12 @@ def half_width(found: End, outputs: int, groups: Numbers, known: Floats) -> Floa
 def open_above(
     cost: Callable[[float], float], found: float, ends: tuple[float, float], worth: float
 ) -> tuple[float, float] | None:
-    """Return the least number that does as well as one found, and the lower end of its interval.
+    """Return the least value as likely as the fitted one, and the lower limit of its interval.
 
-    None but where any larger one does as well, up to the greater of its `ends`, and none at the
-    lesser does not: a play wider than a motion swallows all of it, and no record tells how wide it
-    is. `cost` is half a sum of squares, and `worth` how much of that a log-likelihood of 1 is.
+    Return None unless every larger value, up to the upper of the `ends`, is as likely, and the
+    lower end is not. For example, a play wider than the motion absorbs all of it, and the data do
+    not determine its width. `cost` is half a sum of squares, `worth` the cost of one unit of
+    log-likelihood.
     """
     least, most = ends
     margin = 0.5 * float(chdtri(1.0, 0.05)) * worth  # χ² of one number, 95 %
@@ -66,7 +66,7 @@ def open_above(
 
 
 def least_of(cost: Callable[[float], float], ends: tuple[float, float], limit: float) -> float:
-    """Return the least number between two `ends` that costs no more than a limit, as the last."""
+    """Return the least value between two `ends` whose cost is within a limit, by bisection."""
     below, above = ends
     for _ in range(EDGE_BISECTIONS):
         middle = 0.5 * (below + above)
@@ -74,24 +74,24 @@ def least_of(cost: Callable[[float], float], ends: tuple[float, float], limit: f
     return above
 
 
-def worth_of(found: End, outputs: int) -> float:
-    """Return how much of half the sum of squares a log-likelihood of 1 is, at a fit's end."""
+def cost_of_unit_likelihood(found: End, outputs: int) -> float:
+    """Return the cost, half a sum of squares, of one unit of log-likelihood at the optimum."""
     square, memories = _counted(found.fun, outputs)
     return square * memories
 
 
 def _counted(left: Floats, outputs: int) -> tuple[float, float]:
-    """Return a residual's mean square, and the most frames that count as one."""
+    """Return a residual's mean square, and the longest correlation time of an output, frames."""
     rows = len(left) // outputs
     memories = max(memory(left[i * rows : (i + 1) * rows]) for i in range(outputs))
     return max(float(np.mean(left**2)), 1e-12), memories
 
 
 def cut(groups: Numbers, numbers: int, memories: float) -> Numbers:
-    """Return each frame's stretch, cut where there are too few for so many numbers.
+    """Return each frame's stretch number, with stretches divided if there are too few of them.
 
-    `memories` is how many frames count as one. A part holds `LEAST_MEMORIES` times as many or more,
-    and at the same place in every output.
+    `numbers` is the number of parameters, `memories` the correlation time, frames. A part lasts at
+    least `LEAST_MEMORIES` correlation times, and is the same in every output.
     """
     begins = np.flatnonzero(np.diff(groups, prepend=groups[0] - 1))
     lengths = np.diff(np.append(begins, len(groups)))

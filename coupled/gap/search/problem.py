@@ -1,4 +1,4 @@
-"""What the search over sets works on: a case, with priors for its nuisance parameters."""
+"""The problem that the search over sets solves: a case with priors of nuisance parameters."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from coupled.gap.thresholds import MISMATCH
 from coupled.rig.rig import Rig
 
 Floats = NDArray[np.float64]
-EXACT = ("schedule", "compensation", "linkage")  # the host's arithmetic; laws solved exactly
+EXACT = ("schedule", "compensation", "linkage")  # outputs predicted without model error
 NORMAL_95 = 1.96  # standard deviations from the mean to an end of a 95 % interval
 
 
@@ -35,9 +35,9 @@ class Prior(NamedTuple):
 
 @dataclass(frozen=True)
 class Problem:
-    """A case whose nuisance parameters have priors in place of limits.
+    """A case whose nuisance parameters have Gaussian priors.
 
-    The tolerance of a rig file's number is the 95 % interval of its prior.
+    The tolerance of a value in the rig file is the 95 % interval of its prior.
     """
 
     case: Case
@@ -64,9 +64,10 @@ class Problem:
         return found
 
     def beside(self, effects: Sequence[Effect]) -> list[Effect]:
-        """Return the nuisance parameters of a set: those whose number no effect of it frees.
+        """Return the nuisance parameters of a set: those that no effect of the set frees.
 
-        How the filed friction yields is one where the rig as filed leaves a gap.
+        Presliding parameters are included if the set has dry friction. They are also included if
+        the rig file has dry friction and the loader's residual exceeds the noise.
         """
         freed = {p.key for effect in effects for p in effect.parameters}
         free = list(self.nuisances)
@@ -88,8 +89,8 @@ class Problem:
     ) -> Fit:
         """Return a set fitted together with the nuisance parameters, to the whole record or a part.
 
-        Groups of effects that `parent` has as well, at the same values, are taken over. `near` is a
-        fit of the set that ended at the start.
+        Groups of effects of `parent` at the same values are reused. `near` is a fit of the set that
+        ended at the start.
         """
         free = self.beside(effects)
         begun = self.case.with_contact(effects, free, start or {})
@@ -98,13 +99,13 @@ class Problem:
         return fit_set(self.case, effects, free, self.priors, begun, parent, known, part)
 
     def rig_of(self, effects: Sequence[Effect], values: Mapping[str, float]) -> Rig | None:
-        """Return the rig with a set of these values, None where the physics cannot give it."""
+        """Return the rig with a set and its values; None if these give no valid rig."""
         every = (*effects, *self.beside(effects))
         known = {**self.case.neutral, **values}
         return possible(self.case.nominal, self.case.control, every, known)
 
     def within_tolerance(self, found: Fit) -> Fit:
-        """Return a fit with its nuisance parameters within their 95 %."""
+        """Return a fit with its nuisance parameters clipped to their 95 % intervals."""
         values = dict(found.values)
         for key, prior in self.priors.items():
             if key in values:
@@ -113,28 +114,28 @@ class Problem:
         rig = self.rig_of(found.effects, values)
         return found if rig is None else replace(found, values=values, rig=rig)
 
-    def surely_open(self, settled: Rig) -> Problem:
-        """Return the problem in which a gap that this rig leaves is held to noise alone."""
-        anew = Problem(self.case.surely_open(settled))
-        anew._known.update(self._known)  # no fit asks for a limit
+    def without_colour_allowance(self, root: Rig) -> Problem:
+        """Return the problem without the allowance for noise colour (`Case`)."""
+        anew = Problem(self.case.without_colour_allowance(root))
+        anew._known.update(self._known)  # fits do not depend on limits
         return anew
 
     def over_limit(self, rig: Rig) -> set[str]:
-        """Return the outputs of which a rig leaves more than noise may, by the noise known."""
+        """Return the outputs over their limits, by the present noise floors."""
         gaps, limits = stage_gaps(self.outputs, rig), stage_limits(self.outputs)
         return {at for at, gap in gaps.items() if gap > limits[at]}
 
     @cached_property
     def by_shots(self) -> Problem | None:
-        """The problem with outputs predicted by short replays; None where none has them."""
+        """The problem with outputs predicted by multiple shooting; None if no output has it."""
         short = self.case.by_shots
         return None if short is None else Problem(short)
 
     def variances(self, without: Rig) -> Floats:
         """Return the variance of each output's residual, noise floors², shape (outputs,).
 
-        The noise's, and that of the physics' own error: a share of what the rig without effects
-        leaves. The host's arithmetic is exact, and servo, play and bend are solved exactly.
+        The sum of the noise variance and the model error, a share of the residual of the rig
+        without effects. Outputs of exact laws (`EXACT`) have no model error.
         """
         gaps = np.array([output.gap(without) for output in self.outputs])
         error = np.array([0.0 if one.stage in EXACT else MISMATCH for one in self.outputs])
@@ -142,8 +143,8 @@ class Problem:
 
 
 def _unlimited(name: str, setting: Effect) -> Effect:
-    """Return a nuisance parameter between the bounds of the effect that frees the same number."""
+    """Return a nuisance parameter with the bounds of the effect that frees the same key."""
     (p,) = setting.free
-    wide = BY_NAME[name].free[0]
-    low, high = min(p.low, wide.low), max(p.high, wide.high)
+    effect = BY_NAME[name].free[0]
+    low, high = min(p.low, effect.low), max(p.high, effect.high)
     return replace(setting, parameters=(replace(p, low=low, high=high, may_end=True),))

@@ -1,17 +1,15 @@
-"""Screening: which effects may explain a residual, by the projection on each effect's signature.
+"""Screening: select effects that may explain a residual, by projection on their signatures.
 
-A signature is the change of the residual that an effect makes at a size. Signatures are taken at
-sizes over three decades, since friction, play and rate limits do nothing at one size and everything
-at another; the projection itself is free of scale. The size that leaves least is where a fit
-starts.
+A signature is the change of the residual that an effect of a given size makes. Signatures are
+computed at sizes over three decades, since friction, play and rate limits are strongly nonlinear in
+their size. The projection is independent of scale. A fit starts from the size of least residual.
 
-The power that a signature takes of the residual is the score test's statistic, and gives the gain
-in log-likelihood that the effect is predicted to make (Rao, Math. Proc. Camb. Phil. Soc. 44, 1948).
-An effect whose predicted gain is less than what its prior costs is not fitted. Two effects may pay
-together where neither does alone, since what each leaves is slow and counts few samples: where none
-pays, the best pair is screened by the projection on both signatures. The signatures
-beside one set of effects are nearly those beside another: they are taken once, and again only
-beside the best set.
+The power of the projection is the statistic of the score test, and gives the predicted gain in
+log-likelihood (Rao, Math. Proc. Camb. Phil. Soc. 44, 1948). An effect is fitted only if this gain
+exceeds its log prior. Two effects may be significant together and not alone, since a residual with
+one of them has a long correlation time and few effective samples. If no single effect is worth a
+fit, the best pair is screened by the projection on both signatures. Signatures depend little on the
+other effects of a set. They are computed once, and again only with the best set.
 """
 
 from __future__ import annotations
@@ -50,10 +48,10 @@ Values = dict[str, float]
 
 
 class Screened(NamedTuple):
-    """A candidate, where its fits start, and what its signature takes of the residual.
+    """A candidate, the starts of its fits, and the projection of the residual on its signature.
 
-    `taken` is the power, noise floors², `gain` the predicted log-likelihood gain, `direction` the
-    signature that takes most, of unit length.
+    `taken` is the power of the projection, noise floors², `gain` the predicted log-likelihood gain,
+    `direction` the signature with the largest projection, of unit length.
     """
 
     effect: Effect
@@ -64,14 +62,14 @@ class Screened(NamedTuple):
 
 
 class Worth(NamedTuple):
-    """The `least` predicted gain for which an effect is fitted, and the outputs' samples."""
+    """The `least` predicted gain for a fit, and `counts`, the effective samples of each output."""
 
     least: float
     counts: Floats
 
 
 class _Signature(NamedTuple):
-    """The change of the residual that an effect of some values makes, noise floors, by shape."""
+    """The change of the residual by an effect with given values, noise floors."""
 
     values: Values
     shape: int
@@ -80,7 +78,7 @@ class _Signature(NamedTuple):
 
 @dataclass
 class Screen:
-    """Screens candidates beside sets of effects, and keeps their signatures."""
+    """The screen of candidates to add to a set, with a cache of their signatures."""
 
     problem: Problem
     variance: Floats
@@ -94,11 +92,10 @@ class Screen:
         most: int = BEAM_CANDIDATES,
         anew: bool = False,
     ) -> list[Screened]:
-        """Return the candidates whose signatures take most of the residual, the best first.
+        """Return the candidates with the largest projections of the residual, the best first.
 
-        Those that take far less than the best are left out, and those that are not `worth` it.
-        Signatures are taken beside the current effects where they are not known, or are asked for
-        `anew`.
+        Candidates far below the best, or with too small a predicted gain (`worth`), are left out.
+        Signatures are computed with the current effects if they are not cached, or if `anew`.
         """
         wanted = [e for e in candidates if anew or e.name not in self.known]
         for effect, made in zip(
@@ -114,10 +111,10 @@ class Screen:
     def pair(
         self, current: Fit, candidates: Sequence[Effect], worth: Worth
     ) -> tuple[Screened, Screened] | None:
-        """Return the two candidates of one output that take most of its residual together.
+        """Return the two candidates of one output with the largest joint projection.
 
-        None where two effects are not worth it. Samples are counted by what both leave. The
-        signatures of the candidates are those that `best` has taken.
+        None if the predicted gain is too small for two effects. Effective samples follow from the
+        residual without both. The signatures are those that `best` has computed.
         """
         groups: dict[tuple[int, ...], list[Effect]] = {}
         for effect in candidates:
@@ -142,11 +139,11 @@ class Screen:
         return None if found is None else found[1]
 
     def _ours(self, effect: Effect) -> list[int]:
-        """Return the numbers of the outputs in which an effect shows."""
+        """Return the indices of the outputs in which an effect shows."""
         return [k for k, one in enumerate(self.problem.outputs) if one.stage in effect.shows_in]
 
     def _edges(self, ours: Sequence[int]) -> NDArray[np.int64]:
-        """Return where each of some outputs begins in their joint residual."""
+        """Return the first frame of each of some outputs in their joint residual."""
         return np.cumsum([0, *(len(self.problem.outputs[k].measured) for k in ours[:-1])])
 
     def _squares(self, ours: Sequence[int], left: Floats) -> Floats:
@@ -156,7 +153,7 @@ class Screen:
         return np.asarray(squares / self.variance[list(ours)])
 
     def _screened(self, current: Fit, effect: Effect, counts: Floats) -> Screened:
-        """Return a candidate with the start of each shape that leaves least."""
+        """Return a candidate with the best start of each shape."""
         now, ours = _residual(self.problem, effect, current.rig), self._ours(effect)
 
         def unlikely(left: Floats) -> float:
@@ -166,7 +163,7 @@ class Screen:
         direction = np.zeros(len(now))
         for values, shape, change in self.known[effect.name]:
             size = float(change @ change)
-            # A limit that is never met leaves the residual as it is, and a fit where it was.
+            # A limit that is never reached does not change the residual.
             if size <= SCREEN_SHOWN * len(now):
                 continue
             share = float(now @ change) / size
@@ -179,7 +176,7 @@ class Screen:
         return Screened(effect, [values for _, values in starts.values()], taken, gain, direction)
 
     def _signatures(self, current: Fit, effect: Effect) -> list[_Signature]:
-        """Return an effect's signatures beside the current effects."""
+        """Return an effect's signatures with the current effects."""
         now = _residual(self.problem, effect, current.rig)
         found = []
         for shape, tries in enumerate(_tries(self.problem, current, effect)):
@@ -193,7 +190,7 @@ class Screen:
 
 
 def _best_two(shapes: Floats, now: Floats) -> tuple[int, int]:
-    """Return which two of some unit vectors take most of a residual together."""
+    """Return the indices of the two unit vectors with the largest joint projection."""
     alike = np.clip(shapes @ shapes.T, -1.0, 1.0)
     np.fill_diagonal(alike, 1.0)
     own, apart = shapes @ now, np.maximum(1.0 - alike**2, 1e-300)
@@ -205,16 +202,16 @@ def _best_two(shapes: Floats, now: Floats) -> tuple[int, int]:
 
 def _residual(problem: Problem, effect: Effect, rig: Rig) -> Floats:
     ours = touched(problem.outputs, [effect])
-    return np.concatenate([output.residual(rig, wide=True) for output in ours])
+    return np.concatenate([output.residual(rig, coarse=True) for output in ours])
 
 
 def _with(problem: Problem, current: Fit, effect: Effect, values: Values) -> Rig | None:
-    """Return the current rig with one more effect, None where the physics cannot give it."""
+    """Return the current rig with one more effect; None if it is no valid rig."""
     return problem.rig_of((*current.effects, effect), {**current.values, **values})
 
 
 def _tries(problem: Problem, current: Fit, effect: Effect) -> list[list[Values]]:
-    """Return sets of an effect's parameters to try, by shapes of which each may give a start."""
+    """Return values of an effect's parameters to try, by shape; each shape may give a start."""
     if is_limit(effect) and not STAGE_OF[effect.stage].flown:
         key = effect.value_key(effect.free[0])
         now = _residual(problem, effect, current.rig)
@@ -241,7 +238,7 @@ def _tries(problem: Problem, current: Fit, effect: Effect) -> list[list[Values]]
 
 
 def _sizes(problem: Problem, current: Fit, effect: Effect, shape: int) -> list[Values]:
-    """Return sets of an effect's parameters to try; one where each has to be flown."""
+    """Return values of an effect's parameters to try; a single one if each needs a flight."""
     flown = STAGE_OF[effect.stage].flown
     found = []
     for k in range(1 if flown or not effect.free else len(BEAM_SIZES)):
@@ -259,7 +256,7 @@ def _sizes(problem: Problem, current: Fit, effect: Effect, shape: int) -> list[V
 
 
 def _less(problem: Problem, effect: Effect, first: Values) -> list[Values]:
-    """Return sets with less of what is filed than the rig file says, where some of it is."""
+    """Return values that reduce a nonzero value of the rig file."""
     found = []
     for share in SCREEN_LESS:
         values = dict(first)
@@ -272,15 +269,15 @@ def _less(problem: Problem, effect: Effect, first: Values) -> list[Values]:
 
 
 def is_limit(effect: Effect) -> bool:
-    """Tell whether an effect is a limit and nothing else."""
+    """Tell whether an effect is a single limit."""
     return len(effect.free) == 1 and effect.free[0].inverse
 
 
 def limits(effect: Effect, shows: Callable[[float], bool]) -> list[list[float]]:
-    """Return sets of limits to try, from the largest one that shows on, in the limit's own unit.
+    """Return sets of limits to try, from the largest limit that shows down, in the limit's unit.
 
-    Of each set the best is a start. `shows` tells of a limit whether it changes what is predicted.
-    None where not even the lowest does.
+    The best of each set is a start. `shows` returns whether a limit changes the prediction. Return
+    no set if not even the lowest limit does.
     """
     number = effect.free[0]
     low, high = math.log(number.low), math.log(number.high)

@@ -1,9 +1,8 @@
-"""Slopes of a residual, by differences, and how long they hold.
+"""The Jacobian of a residual by finite differences, and its reuse between iterations.
 
-A difference costs a replay for each number. Where a residual that jumps has hardly moved, slopes
-are as good as new ones: over less than a difference, there is nothing to be learnt. A smooth one is
-seen to go as the slopes say, and they are corrected by what they missed of its last move (Broyden,
-Math. Comp. 19, 1965).
+Differences cost a replay for each parameter. For a residual with jumps the last Jacobian is reused
+while the residual has changed by less than a difference step. For a smooth residual it is corrected
+by the error of its prediction of the last step (Broyden, Math. Comp. 19, 1965).
 """
 
 from __future__ import annotations
@@ -32,28 +31,28 @@ Ends = tuple[Floats, Floats]
 
 @dataclass(frozen=True)
 class Slope:
-    """A residual of all frames where it was known last, and what each scaled number changes it by.
+    """The residual of all frames and its Jacobian, at the scaled parameters `at`.
 
-    `left` has shape (frames,), in floors, `jacobian` (frames, numbers).
+    `residual` has shape (frames,), in noise floors, `jacobian` (frames, parameters).
     """
 
     at: Floats
-    left: Floats
+    residual: Floats
     jacobian: Floats
 
     def kept(self) -> Slope | None:
-        """Return it, to begin another fit by; None where it would take much memory."""
+        """Return the Jacobian, to start another fit with; None if it is too large to keep."""
         return self if self.jacobian.size <= SLOPES_KEPT else None
 
 
 class Slopes:
-    """Derivatives by differences, over steps that change the residual by about a third of a floor.
+    """Finite differences over steps that change the residual by about a third of a noise floor.
 
-    Friction, breakout and play move the residual in small jumps: a difference over less than
-    those says nothing of where the fit should go, nor of how well it knows. Far from the end the
-    jumps are larger: a difference is over no less than a `share` of the residual. One that has
-    none is `smooth`. `last` is what was known last, from another fit of the same numbers to the
-    same frames too. Columns of `held` that are no NaN are taken over, shape (frames, numbers).
+    Friction, breakout and play make the residual jump by small amounts: a difference over less is
+    no derivative of the fit's cost. Far from the optimum the jumps are larger, and a step changes
+    the residual by at least a `share` of it. A residual without jumps is `smooth`. `last` is the
+    last Jacobian, possibly of another fit of the same parameters to the same frames. Columns of
+    `held` without NaN are reused, shape (frames, parameters).
     """
 
     def __init__(
@@ -72,10 +71,10 @@ class Slopes:
         self._step = np.full(len(self._low), 0.01)
         self.last = last
         self.corrections = 0  # since the last differences
-        self.sure = True  # they missed little
+        self.sure = True  # the prediction errors were small
 
     def __call__(self, x: Floats) -> Floats:
-        """Return the slopes of the rows fitted, shape (rows, numbers)."""
+        """Return the Jacobian of the fitted rows, shape (rows, parameters)."""
         here = self._residual(x)
         jacobian = self._still_good(x, here)
         if jacobian is None:
@@ -85,15 +84,15 @@ class Slopes:
         return np.asarray(jacobian[self._rows])
 
     def renew(self) -> None:
-        """Forget what was known, so that differences are taken next."""
+        """Discard the last Jacobian, so that differences are taken next."""
         self.last = None
 
     def _still_good(self, x: Floats, here: Floats) -> Floats | None:
-        """Return the slopes by what was known last; None where that says too little."""
+        """Return the last Jacobian, corrected if need be; None if it no longer holds."""
         last = self.last
-        if last is None or len(last.left) != len(here):
+        if last is None or len(last.residual) != len(here):
             return None
-        moved, step = here - last.left, x - last.at
+        moved, step = here - last.residual, x - last.at
         size = _rms(moved)
         if not self._smooth or size <= MOVED_LEAST:
             return last.jacobian if size <= MOVED_LITTLE else None

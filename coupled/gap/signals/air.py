@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from scipy.linalg import solveh_banded
 
 from coupled.gap.noise.smooth import Smoother, rate_of, smoothed
-from coupled.gap.signals.output import heard, white
+from coupled.gap.signals.output import estimate_noise, white
 from coupled.gap.thresholds import STIFFEST_AIR
 from coupled.record.record import Record
 
@@ -55,7 +55,7 @@ def vertical_air(record: Record, frame_s: float, seed: int = 43) -> Air | None:
     rng = np.random.default_rng(seed)
     climb, climb_error = _climb(record, frame_s, rng)
     rough = climb - smoothed(speed) * np.sin(pitch - alpha)
-    level = heard(rough)
+    level = estimate_noise(rough)
     smoother = Smoother.of(rough, (1,))
     smooth = smoother.smooth(rough)
     error = smoother.wiener_error(level, len(rough), rng) + climb_error

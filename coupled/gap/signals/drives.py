@@ -21,7 +21,7 @@ from collections.abc import Collection
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from coupled.gap.signals.output import Floats, heard, rounding
+from coupled.gap.signals.output import Floats, estimate_noise, rounding
 from coupled.gap.thresholds import (
     COUNTS,
     HELD_AT_MOST,
@@ -84,7 +84,7 @@ def _made(record: Record, control: ControlName) -> bool:
     given, grip = channel(control, "computed"), channel(control, "deflection")
     if any(name in record for name in others) or not (given in record and grip in record):
         return False
-    return _finest(record[given]) < HELD_FINER * heard(record[grip]).rms
+    return _finest(record[given]) < HELD_FINER * estimate_noise(record[grip]).rms
 
 
 def _finest(signal: Floats) -> float:
@@ -139,4 +139,4 @@ def _count(record: Record, name: str) -> float:
     """Return the size of a channel's count in its unit, 0 where that is little of its noise."""
     signal = record[name]
     error = rounding(signal, math.inf)
-    return error * math.sqrt(12.0) if error > COUNTS * heard(signal).rms else 0.0
+    return error * math.sqrt(12.0) if error > COUNTS * estimate_noise(signal).rms else 0.0

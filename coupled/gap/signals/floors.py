@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from coupled.gap.noise.noise import Noise
 from coupled.gap.noise.quiet import noise_of_input, quiet_noise
 from coupled.gap.noise.smooth import Smoother
-from coupled.gap.signals.output import heard, rounding
+from coupled.gap.signals.output import estimate_noise, rounding
 from coupled.gap.thresholds import LEAST_NOISE, LOUDER
 from coupled.rig.rig import Rig
 
@@ -20,7 +20,7 @@ Floats = NDArray[np.float64]
 
 def noise_in(rig: Rig, channel: str, signal: Floats) -> Noise:
     """Return the noise of a channel; at least `given_noise` if its log was filtered."""
-    found = heard(signal)
+    found = estimate_noise(signal)
     if not found.filtered:
         return found
     return replace(found, rms=max(found.rms, given_noise(rig, channel, signal).rms))
@@ -33,38 +33,38 @@ def given_noise(rig: Rig, channel: str, signal: Floats) -> Noise:
     return Noise(known or max(least, rounding(signal, np.inf)))
 
 
-def input_noise(heard_: Noise, signal: Floats) -> Noise:
+def input_noise(estimated: Noise, signal: Floats) -> Noise:
     """Return the noise of a stage's input; at least its rounding."""
-    found = None if heard_.filtered else noise_of_input(signal)
-    return heard_ if found is None else _no_less(found, signal)
+    found = None if estimated.filtered else noise_of_input(signal)
+    return estimated if found is None else _no_less(found, signal)
 
 
 def left_noise(
-    heard_: Noise, signal: Floats, left: Floats, judged: NDArray[np.bool_] | None = None
+    estimated: Noise, signal: Floats, left: Floats, judged: NDArray[np.bool_] | None = None
 ) -> Noise:
     """Return a channel's noise from the residual of its stage; at least its rounding.
 
-    `heard_` is the noise estimated from the signal alone. It is kept for a filtered log, for a
+    `estimated` is the noise estimated from the signal alone. It is kept for a filtered log, for a
     short record, and if the residual is far larger: a signal that jumps elsewhere than predicted is
     a gap, not noise. Frames that are not `judged` have no residual. The noise is estimated from the
-    others, and its rms taken over all frames; if no frame is judged, `heard_` is kept.
+    others, and its rms taken over all frames; if no frame is judged, `estimated` is kept.
     """
     rows = np.ones(len(left), dtype=bool) if judged is None else judged
-    found = None if heard_.filtered else quiet_noise(left[rows])
-    if found is not None and found.rms <= LOUDER * heard_.rms:
-        heard_ = _no_less(found, signal)
+    found = None if estimated.filtered else quiet_noise(left[rows])
+    if found is not None and found.rms <= LOUDER * estimated.rms:
+        estimated = _no_less(found, signal)
     share = float(np.mean(rows)) or 1.0
-    return replace(heard_, rms=heard_.rms * math.sqrt(share))
+    return replace(estimated, rms=estimated.rms * math.sqrt(share))
 
 
-def without_echo(left: Floats, echo: Floats | None) -> Floats:
+def remove_projection(left: Floats, onto: Floats | None) -> Floats:
     """Return a residual without the part that repeats another channel's noise, same shape.
 
     A host's product of δc as read contains the noise of that reading. It shows how the product is
     computed and must not count as the product's own noise.
     """
-    power = 0.0 if echo is None else float(echo @ echo)
-    return left if echo is None or power == 0.0 else left - float(left @ echo) / power * echo
+    power = 0.0 if onto is None else float(onto @ onto)
+    return left if onto is None or power == 0.0 else left - float(left @ onto) / power * onto
 
 
 def _no_less(found: Noise, signal: Floats) -> Noise:
@@ -87,7 +87,7 @@ def unsmoothed(signal: Floats, k: int, level: Noise) -> Floats:
 
 def floor_from(rig: Rig, channel: str, signal: Floats) -> str:
     """Return the source of a channel's noise floor if its log was filtered, in words."""
-    if heard(signal).rms > given_noise(rig, channel, signal).rms:
+    if estimate_noise(signal).rms > given_noise(rig, channel, signal).rms:
         return "the level at its highest frequencies"
     if rig.noise.get(channel, 0.0) > 0.0:
         return "the rig file"

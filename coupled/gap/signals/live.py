@@ -113,13 +113,15 @@ def live_of(record: Record) -> Live | None:
     other = settings.other_hardware()
     if not settings.known:  # a switch of unknown kind
         other |= validity == SWITCHED
-    heard = sampled | bridged
-    judged, starts = _stretches(heard & (validity != FADED) & ~other, clock.jumps, frame_s)
+    received = sampled | bridged
+    judged, starts = _stretches(received & (validity != FADED) & ~other, clock.jumps, frame_s)
     present = [channel(control, q) for control in CONTROL_NAMES for q in MEASURED]
     signals = {
-        name: clock.resampled(record[name], sampled, heard) for name in present if name in record
+        name: clock.resampled(record[name], sampled, received) for name in present if name in record
     }
-    quiet = max(_runs(heard, clock.jumps), key=lambda run: run.stop - run.start, default=slice(0))
+    quiet = max(
+        _runs(received, clock.jumps), key=lambda run: run.stop - run.start, default=slice(0)
+    )
     assumed = settings.assumed()
     words = _words(frame_s, sampled, bridged, validity, other, clock)
     return Live(judged, starts, quiet, signals, assumed, (*words, *map(_in_words, assumed.items())))
@@ -236,10 +238,10 @@ class _Clock:
             drift = Polynomial.fit(rows[part][near], away[part][near], degree)
             self.at[rows[part]] += away[part] - drift(rows[part])
 
-    def resampled(self, signal: Floats, sampled: Mask, heard: Mask) -> Floats:
+    def resampled(self, signal: Floats, sampled: Mask, received: Mask) -> Floats:
         """Return a signal at equal steps of the clock.
 
-        Rows that are not `heard` are interpolated linearly.
+        Rows that are not `received` are interpolated linearly.
         """
         rows = np.flatnonzero(sampled)
         if len(rows) < 4:
@@ -247,11 +249,11 @@ class _Clock:
         before = np.maximum.accumulate(self.at[rows])[:-1]
         rows = rows[np.concatenate(([True], self.at[rows][1:] > before + LEAST_STEP))]
         moved = np.abs(self.at[rows] - rows).max() > LEAST_STEP
-        if heard.all() and len(rows) == len(signal) and not moved:
+        if received.all() and len(rows) == len(signal) and not moved:
             return signal
         at, frames = self.at[rows], np.arange(len(signal))
         found = np.interp(frames, at, signal[rows])
-        inside = heard & (frames >= at[0]) & (frames <= at[-1])
+        inside = received & (frames >= at[0]) & (frames <= at[-1])
         found[inside] = CubicSpline(at, signal[rows])(frames[inside])
         return found
 

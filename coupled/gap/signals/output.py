@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.gap.noise.noise import Noise, noise_of
-from coupled.gap.signals.steps import widely_stepped
+from coupled.gap.signals.steps import coarsely_stepped
 from coupled.gap.thresholds import (
+    COARSE_NEAR,
+    FAULTY_FROM,
     FLOOR_SHARE,
-    GUILTY_FROM,
     MISMATCH,
     NOISE_ALONE,
     NOISE_SIGMAS,
@@ -22,7 +23,6 @@ from coupled.gap.thresholds import (
     SMOOTHING_LOST,
     STRETCH_POWER,
     UNCORRELATED,
-    WIDE_NEAR,
     SHORTEST_STRETCH_s,
     STRETCH_s,
 )
@@ -35,7 +35,7 @@ _KEPT = 8  # size of the cache of residuals; threads fit different effects at on
 
 
 @dataclass(frozen=True)
-class Hides:
+class HiddenGap:
     """A noise floor that may hide a gap: `share` is the floor over the channel's motion, both rms.
 
     `noisiest` is the channel whose noise dominates the floor, `channel` that of the output.
@@ -108,7 +108,7 @@ class Output:
     record: int = 0
     spread: float = 0.0
     smoothed: float = 0.0
-    hides: Hides | None = None
+    hidden_gap: HiddenGap | None = None
     held: NDArray[np.bool_] | None = field(default=None, repr=False, compare=False)
     missed: NDArray[np.bool_] | None = field(default=None, repr=False, compare=False)
     stepped: bool = False
@@ -120,23 +120,23 @@ class Output:
     handed_on: Floats | None = field(default=None, repr=False, compare=False)
     _known: list[tuple[Any, Floats]] = field(default_factory=list, repr=False, compare=False)
 
-    def widely(self, rig: Rig) -> bool:
+    def allows_coarse_steps(self, rig: Rig) -> bool:
         """Tell whether wide steps of the loader change the prediction little against the floor.
 
         They do not for forces up to half of the frame rate, and for floors near zero.
         """
         stepped = replace(self, stepped=True)
-        change = stepped.residual(rig, wide=True) - stepped.residual(rig)
-        return float(np.sqrt(np.mean(change**2))) < WIDE_NEAR
+        change = stepped.residual(rig, coarse=True) - stepped.residual(rig)
+        return float(np.sqrt(np.mean(change**2))) < COARSE_NEAR
 
     def residual(
-        self, rig: Rig, part: Part = "all", wide: bool = False, rough: bool = False
+        self, rig: Rig, part: Part = "all", coarse: bool = False, rough: bool = False
     ) -> Floats:
         """Return measured minus predicted, in floors, shape (frames,), of a part's stretches.
 
-        `wide`: with wide steps of the loader (`steps`). `rough`: approximate, for derivatives.
+        `coarse`: with wide steps of the loader (`steps`). `rough`: approximate, for derivatives.
         """
-        rig = widely_stepped(rig) if wide and self.stepped else rig
+        rig = coarsely_stepped(rig) if coarse and self.stepped else rig
         predict = self.rough if rough and self.rough is not None else self.predict
         key = (rig.controls, rig.flight, rig.substeps, predict is self.predict)
         left = next((left for known, left in self._known if known == key), None)
@@ -202,7 +202,7 @@ class Output:
     def limit(self) -> float:
         """The largest gap of noise alone."""
         noise = 1.0 + NOISE_SIGMAS * self.spread + SMOOTHING_LOST * self.smoothed
-        return max(GUILTY_FROM, noise * (1.0 + self.unsure), 1.0 + self.mismatch)
+        return max(FAULTY_FROM, noise * (1.0 + self.unsure), 1.0 + self.mismatch)
 
     @property
     def does(self) -> float:
@@ -218,10 +218,10 @@ class Output:
 
 def white(signal: Floats) -> float:
     """Return the rms of the noise in a smooth signal."""
-    return heard(signal).rms
+    return estimate_noise(signal).rms
 
 
-def heard(signal: Floats) -> Noise:
+def estimate_noise(signal: Floats) -> Noise:
     """Return the noise in a smooth signal (`noise`).
 
     It is at least the rounding, which is not white in a slow signal.
@@ -294,7 +294,7 @@ def stage_limits(outputs: Sequence[Output]) -> dict[str, float]:
     """Return the largest gap of noise alone of each stage."""
     found: dict[str, float] = {}
     for output in outputs:
-        found[output.stage] = max(found.get(output.stage, GUILTY_FROM), output.limit)
+        found[output.stage] = max(found.get(output.stage, FAULTY_FROM), output.limit)
     return found
 
 

@@ -95,10 +95,10 @@ class Reading:
             return lambda rig: None
         read, rate_Hz = smoothed(self.record[LOAD]), self.rig.frame_rate
 
-        def felt(rig: Rig) -> Floats:
+        def with_load(rig: Rig) -> Floats:
             return stamped(read, -rig.flight.motion_stamp * rate_Hz if rig.flight else 0.0)
 
-        return felt
+        return with_load
 
     def sensed(self, rig: Rig) -> Sensed:
         """Return the conversion of a rig's readings of this control to the measured quantities."""
@@ -223,14 +223,14 @@ class Reading:
         smooth = smoothed(self.record[PRESSURE])
         return replay_schedule(self.rig, self.control, smooth, beyond=True) * left(self)
 
-    def heard(self, quantity: str) -> Noise:
+    def channel_noise(self, quantity: str) -> Noise:
         """Return the noise of a control's channel."""
         name = self.name_of(quantity)
         return noise_in(self.rig, name, self._quiet(name))
 
     def driving(self, quantity: str) -> Noise:
         """Return the noise of a control's channel as an input, without a broadband signal."""
-        return input_noise(self.heard(quantity), self._quiet(self.name_of(quantity)))
+        return input_noise(self.channel_noise(quantity), self._quiet(self.name_of(quantity)))
 
     def filtered(self) -> dict[str, str]:
         """Return {filtered channel of the control: source of its noise floor}."""

@@ -7,20 +7,20 @@ quarter of the cost. Final fits and all results use the rig's own steps.
 
 from __future__ import annotations
 
-from coupled.gap.thresholds import WIDE_STEPS_Hz
+from coupled.gap.thresholds import COARSE_STEPS_Hz
 from coupled.rig.rig import Rig
 from coupled.schema import quantity
 
 
-class WideRig(Rig):
+class CoarseRig(Rig):
     """A rig whose loader may be stepped more widely than the schema of a rig file allows."""
 
-    loader_rate: float = quantity("Hz", WIDE_STEPS_Hz, gt=0)
+    loader_rate: float = quantity("Hz", COARSE_STEPS_Hz, gt=0)
 
 
-def widely_stepped(rig: Rig) -> Rig:
+def coarsely_stepped(rig: Rig) -> Rig:
     """Return a rig whose loader takes no more steps than the search needs."""
-    if rig.loader_rate <= WIDE_STEPS_Hz:
+    if rig.loader_rate <= COARSE_STEPS_Hz:
         return rig
     given = {name: getattr(rig, name) for name in Rig.model_fields}
-    return WideRig.model_construct(**{**given, "loader_rate": WIDE_STEPS_Hz})
+    return CoarseRig.model_construct(**{**given, "loader_rate": COARSE_STEPS_Hz})

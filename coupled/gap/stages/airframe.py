@@ -25,7 +25,7 @@ from coupled.errors import InputError
 from coupled.gap.noise.smooth import smoothed
 from coupled.gap.signals.air import Air, vertical_air
 from coupled.gap.signals.floors import left_noise
-from coupled.gap.signals.output import Output, heard, spread, white
+from coupled.gap.signals.output import Output, estimate_noise, spread, white
 from coupled.gap.stages.openloop import Flown, Moved, flown_in, fly_open_loop
 from coupled.gap.stages.surfaces import moved, surface_channel, surface_points
 from coupled.gap.stages.trim import Trim, trim_of
@@ -170,7 +170,9 @@ def airframe_outputs(
     carried = model.carried(wrong, flown)
     outputs = []
     for i, name in enumerate(compared):
-        noise = left_noise(heard(record[name]), record[name], record[name] - flown.motion[:, i])
+        noise = left_noise(
+            estimate_noise(record[name]), record[name], record[name] - flown.motion[:, i]
+        )
         own = float(np.hypot(noise.rms, FLIGHT_KNOWN * np.ptp(record[name])))
         moved_by = float(np.sqrt(np.mean(carried[:, i] ** 2)))
         floor = float(np.hypot(own, moved_by))

@@ -36,7 +36,7 @@ def compensated(reading: Reading) -> tuple[str, Floats, Predict, float, float]:
     def predict(rig: Rig) -> Floats:
         return made(rig, reading.sensed(rig).as_the_host_had_it(recorded))
 
-    own = max(reading.heard("computed").rms, ROUNDING_SPAN * float(np.ptp(computed)))
+    own = max(reading.channel_noise("computed").rms, ROUNDING_SPAN * float(np.ptp(computed)))
     rig, carried = reading.rig, 0.0
     if rig.controls[control].sensing.force_stamp != 0.0:
         level, late = reading.driving("force"), reading.sensed(rig).as_the_host_had_it

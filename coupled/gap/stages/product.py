@@ -1,7 +1,7 @@
 """The multiplier's product F_mod, compared with the product of δc itself or of δc as read.
 
 A digital product contains the sensor noise and scale error of δc, an analog product does not. The
-part of F_mod that repeats the noise of δc (`echo`) is therefore not the channel's own noise:
+part of F_mod that repeats the noise of δc (`correlated`) is therefore not the channel's own noise:
 included in the noise floor, it would hide whether the product is digital.
 """
 
@@ -43,7 +43,7 @@ class Product:
     @cached_property
     def own(self) -> Noise:
         """The noise of the channel, from its spectrum."""
-        return self.reading.heard("modifying_force")
+        return self.reading.channel_noise("modifying_force")
 
     @cached_property
     def unsure(self) -> NDArray[np.bool_]:
@@ -63,7 +63,7 @@ class Product:
         return np.asarray(jumps if judged is None else jumps | ~judged)
 
     @cached_property
-    def echo(self) -> Floats:
+    def correlated(self) -> Floats:
         """The noise in the product of δc as read that comes from that reading, N."""
         more = self._made(self._computed) - self._made(self._smooth)
         return np.where(self.unsure, 0.0, more)
@@ -106,7 +106,7 @@ class Product:
 
     @cached_property
     def _level(self) -> Noise:
-        return self.reading.heard("computed")
+        return self.reading.channel_noise("computed")
 
     @cached_property
     def _gradients(self) -> tuple[Floats, Floats | None]:

@@ -24,7 +24,12 @@ from coupled.gap.noise.smooth import smoothed
 from coupled.gap.signals.driven import Drive
 from coupled.gap.signals.output import Floats, Predict
 from coupled.gap.signals.reading import Reading
-from coupled.gap.stages.ratchet import Driven, is_walked, unratcheted, unwalked
+from coupled.gap.stages.ratchet import (
+    Driven,
+    creeps,
+    without_backlash_creep,
+    without_friction_creep,
+)
 from coupled.record.channels import unit_of
 from coupled.rig.hosted import Hosted
 from coupled.rig.nodes import Nodes
@@ -87,9 +92,9 @@ class Series:
             loader = rig.controls[reading.control].loader
             ratchets = loader.play > 0.0 and not reading.by_hand
             if ratchets or loader.bend_hysteresis_share:
-                return unratcheted(rig, reading.control, at, measured)
+                return without_backlash_creep(rig, reading.control, at, measured)
             if self._walks:
-                return unwalked(rig, reading.control, at, measured, times)
+                return without_friction_creep(rig, reading.control, at, measured, times)
             return at(rig, 0.0)
 
         return predicted
@@ -101,7 +106,7 @@ class Series:
             answer = self._driven(force.smooth)
             walks = force.smooth is not force.recorded
             given = (self._reading.rig, self._reading.control, answer, own.rms)
-            self._walks = walks and is_walked(*given)
+            self._walks = walks and creeps(*given)
         return self._predicted(force.smooth, 1.0)
 
     def noisy(self, rig: Rig, k: int) -> Floats:

@@ -31,35 +31,35 @@ from coupled.gap.signals.floors import (
     given_noise,
     left_noise,
     noise_in,
+    remove_projection,
     with_error,
-    without_echo,
 )
 from coupled.gap.signals.live import Mask
-from coupled.gap.signals.output import Hides, Output, Predict, heard, spread
+from coupled.gap.signals.output import HiddenGap, Output, Predict, estimate_noise, spread
 from coupled.gap.signals.reading import Reading
 from coupled.gap.signals.served import asked, left, services
-from coupled.gap.signals.shared import echoed, felt
+from coupled.gap.signals.shared import share_from_source, share_in_response
 from coupled.gap.stages.compensated import compensated
 from coupled.gap.stages.imposed import Imposed
 from coupled.gap.stages.openloop import about
 from coupled.gap.stages.product import Product
 from coupled.gap.stages.ratchet import (
     Driven,
-    is_walked,
-    unratcheted,
-    unwalked,
+    creeps,
+    without_backlash_creep,
+    without_friction_creep,
 )
 from coupled.gap.stages.series import Series
 from coupled.gap.stages.surfaces import filed_trim
 from coupled.gap.stages.trim import trim_of
 from coupled.gap.thresholds import (
     BROAD,
-    ECHO_SHARE,
-    FELT,
-    HALF_FELT,
+    HALF_RESPONDED,
     NOISE_TRIES,
     REPLAY_KNOWN,
+    RESPONDED,
     ROUNDING_SPAN,
+    SOURCE_SHARE,
     SURFACE_KNOWN,
     RESTART_s,
 )
@@ -137,16 +137,16 @@ class Reader(Reading):
         own: Noise,
         driven_by: DrivenBy = UNDRIVEN,
         judged: NDArray[np.bool_] | None = None,
-        echo: Floats | None = None,
+        correlated: Floats | None = None,
     ) -> Output:
         """Return an output whose floor is its own noise and its input's, propagated.
 
         The prediction of frames that are not `judged` is the measurement. For an output that is
-        `driven_by` a quantity of the control, `hides` is set. The part of the residual that
-        repeats an `echo` does not count as noise.
+        `driven_by` a quantity of the control, `hidden_gap` is set. The part of the residual that
+        is proportional to `correlated` does not count as noise.
         """
         base = predict(self.rig)
-        own = left_noise(own, measured, without_echo(measured - base, echo), judged)
+        own = left_noise(own, measured, remove_projection(measured - base, correlated), judged)
         tries = in_threads(lambda k: noisy(self.rig, k) - base, range(NOISE_TRIES))
         carried = _rms(np.array(tries))
         known = REPLAY_KNOWN * float(np.ptp(measured))
@@ -162,14 +162,14 @@ class Reader(Reading):
         if not driven_by.quantity:
             return made
         noisiest = self.name_of(driven_by.quantity) if carried > own.rms else name
-        return replace(made, hides=Hides(floor / float(np.std(measured)), noisiest, name))
+        return replace(made, hidden_gap=HiddenGap(floor / float(np.std(measured)), noisiest, name))
 
     def _output(
         self, stage: str, name: str, measured: Floats, predict: Predict, floor: float
     ) -> Output:
         rate, missed = self.rig.frame_rate, self.missed.seen
         made = Output(stage, name, measured, predict, floor, rate, self.number, missed=missed)
-        return replace(made, stepped=stage in STEPPED and made.widely(self.rig))
+        return replace(made, stepped=stage in STEPPED and made.allows_coarse_steps(self.rig))
 
     def _schedule(self) -> list[Output]:
         pressure, gradient = self.record["dynamic_pressure_Pa"], self.signal("gradient")
@@ -181,8 +181,8 @@ class Reader(Reading):
             missed = self.missed.under(rig, self.control)
             return replay_schedule(rig, self.control, q, missed=missed) * left(self)
 
-        share, rest = echoed(gradient[ran], predict(self.rig, pressure)[ran])
-        if share > ECHO_SHARE:
+        share, rest = share_from_source(gradient[ran], predict(self.rig, pressure)[ran])
+        if share > SOURCE_SHARE:
             # G_T contains the noise of the recorded q̄, so the host computed it from that q̄.
             def as_read(rig: Rig) -> Floats:
                 return predict(rig, pressure)
@@ -199,7 +199,10 @@ class Reader(Reading):
         force, gradient = self.pulled(), self.gradient()
         computed, second = self.signal("computed"), self.second()
         load_of, hosted = self.load(), hosted_by(self)
-        smooth, own = smoothed(computed, sensor := self.driving("computed")), self.heard("computed")
+        smooth, own = (
+            smoothed(computed, sensor := self.driving("computed")),
+            self.channel_noise("computed"),
+        )
         leaks = [Nodes(smoothed(other)) for other in self.partner()]
         every = self._restarts(round(RESTART_s * self.rig.frame_rate))
         restarted = drifts(self.rig, self.control, float(np.min(gradient)))
@@ -237,7 +240,7 @@ class Reader(Reading):
 
         def predicted(at: Driven, times: float = 1.0) -> Predict:
             def walked(rig: Rig) -> Floats:
-                return unwalked(rig, self.control, at, computed, times)
+                return without_friction_creep(rig, self.control, at, computed, times)
 
             return self._judged(walked if walks else lambda rig: at(rig, 0.0), computed)
 
@@ -245,11 +248,11 @@ class Reader(Reading):
             seen = with_error(smooth, k + NOISE_TRIES, sensor)
             return predicted(driven(force.with_error(k), seen), 2.0**0.5)(rig)
 
-        force = self._without_what_was_felt(force, computed)
+        force = self._without_answered_noise(force, computed)
         trembling = Nodes(force.passed(np.random.default_rng(SAMPLED)))
         answer = driven(force.smooth, smooth)
         walks = force.smooth is not force.recorded
-        walks = walks and is_walked(self.rig, self.control, answer, own.rms)
+        walks = walks and creeps(self.rig, self.control, answer, own.rms)
         made = (self.name_of("computed"), computed, predicted(answer), noisy, own)
         between = driven(force.smooth, smooth, otherwise=True)(self.rig, 0.0)
         driven_by = DrivenBy("force", _rms(between - answer(self.rig, 0.0)))
@@ -275,23 +278,23 @@ class Reader(Reading):
             return predict
         return lambda rig: np.where(judged, predict(rig), measured)
 
-    def _without_what_was_felt(self, force: Drive, answer: Floats) -> Drive:
+    def _without_answered_noise(self, force: Drive, answer: Floats) -> Drive:
         """Return a broadband force with the noise reduced to what its response does not show."""
         if force.noise.rms <= BROAD * float(np.std(force.recorded)):
             return force
-        share = felt(force.recorded, answer)
+        share = share_in_response(force.recorded, answer)
         less = float(np.sqrt(max(1.0 - share, 0.0)))
         level = replace(force.noise, rms=force.noise.rms * less)
-        if share > FELT:
+        if share > RESPONDED:
             level = given_noise(self.rig, self.name_of("force"), force.recorded)
-        return replace(force, noise=level) if share <= HALF_FELT else force.unsmoothed(level)
+        return replace(force, noise=level) if share <= HALF_RESPONDED else force.unsmoothed(level)
 
     def _series(self) -> list[Output]:
         """Return the grip's motion under the force, for records without δc."""
         grip = self.signal("deflection")
-        force = self._without_what_was_felt(self.pulled(), grip)
+        force = self._without_answered_noise(self.pulled(), grip)
         series = Series(self, force, hosted_by(self))
-        own = self.heard("deflection")
+        own = self.channel_noise("deflection")
         driven_by = DrivenBy("force")
         made = (self.name_of("deflection"), grip, series.predict(own), series.noisy, own, driven_by)
         found = replace(self._made("loader", *made), in_series=True)
@@ -307,7 +310,9 @@ class Reader(Reading):
     def _multiplier(self) -> list[Output]:
         product = Product(self)
         made = (product.name, product.recorded, product.predict, product.noisy, product.own)
-        return [self._made("multiplier", *made, judged=~product.unsure, echo=product.echo)]
+        return [
+            self._made("multiplier", *made, judged=~product.unsure, correlated=product.correlated)
+        ]
 
     def _linkage(self) -> list[Output]:
         computed, measured = self.signal("computed"), self.signal("deflection")
@@ -326,7 +331,9 @@ class Reader(Reading):
                 )
                 return sensed.zero + drive_linkage(rig, self.control, *driven_by, others)
 
-            return self._judged(lambda rig: unratcheted(rig, self.control, at, measured), measured)
+            return self._judged(
+                lambda rig: without_backlash_creep(rig, self.control, at, measured), measured
+            )
 
         def noisy(rig: Rig, k: int) -> Floats:
             pulled = force.with_error(k + NOISE_TRIES)
@@ -334,7 +341,7 @@ class Reader(Reading):
 
         given, predict = (command.smooth, force.smooth), driven(command.smooth, force.smooth)
         between = driven(*given, otherwise=True)(self.rig) - predict(self.rig)
-        made = (measured, predict, noisy, self.heard("deflection"))
+        made = (measured, predict, noisy, self.channel_noise("deflection"))
         driven_by = DrivenBy("computed", _rms(between))
         name = self.name_of("deflection")
         linkage = self._made("linkage", name, *made, driven_by, judged=self.judged)
@@ -372,7 +379,7 @@ class Reader(Reading):
 
         # The host's noise is in δ̂ and moves the surface, so the floor is the sensor's noise.
         left = measured - position(command)
-        own = left_noise(heard(left), measured, left)
+        own = left_noise(estimate_noise(left), measured, left)
         floor = float(np.hypot(own.rms, SURFACE_KNOWN * np.ptp(measured)))
         return [self._output("surface", self.surface, measured, predict, floor)]
 

@@ -20,10 +20,10 @@ from coupled.flight.altered import STILL, UNALTERED
 from coupled.gap.noise.smooth import Smoother, smoothed
 from coupled.gap.signals.conditions import trim_shift
 from coupled.gap.signals.floors import left_noise
-from coupled.gap.signals.output import heard
+from coupled.gap.signals.output import estimate_noise
 from coupled.gap.stages.openloop import Moved, Points, about
 from coupled.gap.thresholds import (
-    HALF_FELT,
+    HALF_RESPONDED,
     SURFACE_SHAKE,
     SURFACE_GUST_m_per_s,
     SURFACE_MOVES_rad,
@@ -149,8 +149,8 @@ def moved(
             continue
         step = np.where(np.arange(len(position)) > 0, jump, 0.0)
         left = position - _led(rig, record, control, trim)
-        level = left_noise(heard(position), position, left)
-        if float(np.std(left)) < HALF_FELT * heard(position).rms:
+        level = left_noise(estimate_noise(position), position, left)
+        if float(np.std(left)) < HALF_RESPONDED * estimate_noise(position).rms:
             # The command explains its roughness, so that is motion of the surface, not noise.
             smooth, error = position, level.sample(len(position), rng)
             error *= min(1.0, float(np.std(left)) / max(level.rms, 1e-300))

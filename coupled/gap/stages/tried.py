@@ -18,7 +18,7 @@ import numpy as np
 
 from coupled.gap.effects.effect import Effect, Parameter, dotted
 from coupled.gap.effects.scales import Scales, in_scale
-from coupled.gap.signals.output import Floats, Output, heard
+from coupled.gap.signals.output import Floats, Output, estimate_noise
 from coupled.gap.stages.stages import Reader
 from coupled.gap.thresholds import PLAY_LEAST, PLAYS, PLAYS_ALIKE, REACHED_BEYOND, REACHED_OVER
 from coupled.record.channels import ControlName, channel
@@ -110,7 +110,7 @@ def _plays(
     @cache
     def left(play: float) -> tuple[float, float]:
         other = rig.changed({key: number.entered(filed, play)})
-        each = [(one.measured / one.floor, one.residual(other, wide=True)) for one in ours]
+        each = [(one.measured / one.floor, one.residual(other, coarse=True)) for one in ours]
         as_filed = sum(float(np.sum(misfit**2)) for _, misfit in each)
         scaled = sum(_beside_factor(seen, seen - misfit) for seen, misfit in each)
         return as_filed, scaled
@@ -154,10 +154,10 @@ def _under_set_points(
 def _reached(grip: Floats, record: Record) -> float:
     """Return the speed in d/s that the grip surely reached, over a few frames, beyond its noise.
 
-    A play only makes it slower than the servo; a bend would add to it, but has no say here.
+    A play only makes it slower than the servo; a bend would add to it, but is not considered.
     """
     rate_Hz = (len(grip) - 1) / float(record.time_s[-1] - record.time_s[0])
-    noise = REACHED_BEYOND * heard(grip).rms
+    noise = REACHED_BEYOND * estimate_noise(grip).rms
     over = [n for n in REACHED_OVER if n < len(grip)]
     way = [float(np.max(np.abs(grip[n:] - grip[:-n]))) - noise for n in over]
     return max([rate_Hz * w / n for n, w in zip(over, way, strict=True)], default=0.0)

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from coupled.gap.noise.smooth import smoothed
 from coupled.gap.signals.conditions import trim_shift
-from coupled.gap.signals.output import heard, memory, white
+from coupled.gap.signals.output import estimate_noise, memory, white
 from coupled.gap.stages.openloop import about, flown_in, fly_open_loop
 from coupled.gap.stages.surfaces import filed_trim, moved, own_trim, surface_channel, surface_points
 from coupled.gap.thresholds import (
@@ -94,7 +94,7 @@ def _standing_off(rig: Rig, record: Record, control: ControlName) -> tuple[float
     measured = record[surface_channel(control)]
     held = about(own_trim(rig, control), filed_trim(rig, control), points)
     left = measured[1:rows] - np.interp(held + asked[: rows - 1], *points)
-    noise = heard(measured)
+    noise = estimate_noise(measured)
     crowded = (1.0 + noise.memory) / (1.0 - noise.memory)  # variance of a mean, over white noise's
     smooth = np.interp(held + smoothed(asked)[: rows - 1], *points)
     return _constant(left, smooth - np.interp(held, *points), noise.rms * math.sqrt(crowded))

@@ -84,7 +84,7 @@ def test_a_fit_of_the_same_set_begins_at_the_given_start() -> None:
     """Not where its parent ended, which may be a local minimum that short replays lead out of."""
     one = problem(2e-4)
     parent = one.fit((BEND,))
-    begun = one.fit((BEND,), {**parent.values, KEY: 5e-4}, parent, Descent("wide", 1))
+    begun = one.fit((BEND,), {**parent.values, KEY: 5e-4}, parent, Descent("coarse", 1))
     assert begun.values[KEY] == pytest.approx(5e-4)
 
 
@@ -92,8 +92,8 @@ def test_a_residual_below_the_error_of_a_healthy_model_is_no_evidence() -> None:
     """The floor is then the model's misfit: a smaller residual is as well explained."""
     half = problem(1e-4, 1e-4)
     loud = [replace(output, floor=2.0 * output.floor) for output in half.case.outputs]
-    for only_wide, square in ((False, 0.25), (True, 1.0)):
-        one = Problem(replace(half.case, outputs=loud, only_wide=only_wide))
+    for model_error_in_floors, square in ((False, 0.25), (True, 1.0)):
+        one = Problem(replace(half.case, outputs=loud, model_error_in_floors=model_error_in_floors))
         found = evidence(one, one.fit(()), np.ones(1))
         assert found.squares == pytest.approx([square], rel=0.1)
 
