@@ -376,8 +376,7 @@ def test_a_narrow_terminal_cuts_no_number(folder: Path, columns: int) -> None:
     assert "…" not in shown
     assert max(len(line) for line in shown.splitlines()) <= columns
     # A narrow column wraps the label, not the numbers.
-    [_, *after] = re.split(r"^ *force\b", shown, maxsplit=1, flags=re.MULTILINE)
-    after = "".join(after)
+    after = re.split(r"^ *force\b", shown, maxsplit=1, flags=re.MULTILINE)[-1]
     assert [word for word in after.split() if word in numbers][:2] == numbers
 
 
