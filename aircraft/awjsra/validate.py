@@ -12,7 +12,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -53,8 +52,7 @@ def trimmed(rig: Rig, estimates: dict[str, float] | None = None) -> jsbsim.FGFDM
     fdm["propulsion/set-running"] = -1
     for name, value in {**flight.properties, **(estimates or {})}.items():
         fdm[name] = value
-    elevator = partial(fdm.set_property_value, "fcs/elevator-cmd-norm")
-    problem = newton_trim(fdm, flight, [(1.0, elevator)])
+    problem = newton_trim(fdm, flight)
     if problem:
         raise RuntimeError(problem)
     return fdm

@@ -36,13 +36,19 @@ Elevators = Sequence[tuple[float, Callable[[float], object]]]  # sign and setter
 
 
 def newton_trim(
-    fdm: Any, flight: Flight, elevators: Elevators, start_alpha_rad: float = 0.07
+    fdm: Any,
+    flight: Flight,
+    elevators: Elevators | None = None,
+    start_alpha_rad: float = 0.07,
 ) -> str:
     """Trim a loaded aircraft on its flight path; return why it cannot be, or an empty string.
 
-    Altitude, flaps and the rig's other settings must be set before. Dynamic systems are kept at
-    their steady state.
+    `elevators` set the commands of the pitch control, by default `fcs/elevator-cmd-norm`. Altitude,
+    flaps and the rig's other settings must be set before. Dynamic systems are kept at their steady
+    state.
     """
+    if elevators is None:
+        elevators = [(1.0, partial(fdm.set_property_value, "fcs/elevator-cmd-norm"))]
     fdm.set_trim_status(True)
     try:
         for throttle in _STARTS:
