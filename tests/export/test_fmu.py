@@ -132,7 +132,7 @@ def test_what_is_left_out_is_told() -> None:
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("t37", "--fmu", "x.fmu"), "control: an FMU has one control; choose of column"),
+        (("t37", "--fmu", "x.fmu"), "control: an FMU has one control; give one of column"),
         (("t37", "--fmu", "x.fmu", "--control", "knee"), "control: the rig has no 'knee'"),
         (("bench", "--fmu", "x.zip"), "x.zip: an FMU ends in .fmu"),
         (("bench", "--fmu", "no/x.fmu"), "no"),

@@ -74,7 +74,7 @@ def chosen_control(rig: Rig, control: str, file: object) -> ControlName:
     if control and control not in names:
         raise InputError(file, "control", f"the rig has no {control!r}; {nearest(control, names)}")
     if not control and len(names) > 1:
-        raise InputError(file, "control", f"an FMU has one control; choose of {listed(names)}")
+        raise InputError(file, "control", f"an FMU has one control; give one of {listed(names)}")
     return control or names[0]
 
 
