@@ -74,7 +74,7 @@ def export_fmu(
     >>> import coupled
     >>> coupled.export_fmu("t37", "t37.fmu")
     Traceback (most recent call last):
-    coupled.errors.InputError: …t37.toml: control: an FMU has one control; give one of column, wheel…
+    coupled.errors.InputError: …t37.toml: control: an FMU has one control; give one of column, …
     """
     place = Path(file)
     check_file(place)
