@@ -102,7 +102,7 @@ def read_sweep(path: Path, control: ControlName) -> Sweep:
 
 
 def _motion(deflection: Floats) -> Floats:
-    """Return the direction of the motion at each reading, 0 at the turning points."""
+    """Return the direction of the motion at each reading, 0 until it has left a turning point."""
     least = TURNS * float(np.ptp(deflection))
     turns, extreme, way = [0], 0, 0.0
     for k, value in enumerate(deflection):
@@ -116,7 +116,8 @@ def _motion(deflection: Floats) -> Floats:
     turns.append(len(deflection) - 1)
     motion = np.zeros(len(deflection))
     for begun, ended in pairwise(turns):
-        motion[begun + 1 : ended] = np.sign(deflection[ended] - deflection[begun])
+        gone = deflection[begun + 1 : ended] - deflection[begun]
+        motion[begun + 1 : ended] = np.where(np.abs(gone) > least, np.sign(gone), 0.0)
     return motion
 
 

@@ -72,6 +72,30 @@ def test_exact_readings_give_the_exact_curve(tmp_path: Path) -> None:
     assert found.rms_N < 0.1
 
 
+def test_readings_at_rest_at_a_turning_point_are_not_used(tmp_path: Path) -> None:
+    """Friction holds any force at rest: here between the forces of both directions."""
+    end = NODES[-1]
+    ways = (
+        (0.0, end, 1.0),
+        (end, end, 0.3),
+        (end, -end, -1.0),
+        (-end, -end, 0.2),
+        (-end, 0.0, 1.0),
+    )
+    at = np.concatenate([np.linspace(a, b, 40)[1:] for a, b, _ in ways])
+    motion = np.repeat([way for *_, way in ways], 39)
+    forces = np.sign(at) * (BREAKOUT_N + np.interp(np.abs(at), NODES, FORCES[0.0]))
+    forces += FRICTION_N * motion
+    rows = [f"{d:.6f},{f:.6f}" for d, f in zip(at, forces, strict=True)]
+    path = tmp_path / "rest.csv"
+    path.write_text("\n".join(["deflection_m,force_N", *rows]) + "\n", encoding="utf-8")
+    found = fitted(path)
+    assert found.friction_N == pytest.approx(FRICTION_N, abs=0.05)
+    places = np.linspace(0.01, 0.17, 17)
+    expected = BREAKOUT_N + np.interp(places, NODES, FORCES[0.0])
+    assert found.at(places, 0, 0.0) == pytest.approx(expected, abs=0.5)
+
+
 def test_a_cyclic_flat_about_the_middle_is_unlike_on_its_two_sides(tmp_path: Path) -> None:
     rng, lines = np.random.default_rng(3), ["deflection_m,force_N,direction"]
     at, motion = swept(CYCLIC[0], CYCLIC[-1])
