@@ -91,6 +91,7 @@ def test_readings_at_rest_at_a_turning_point_are_not_used(tmp_path: Path) -> Non
     path.write_text("\n".join(["deflection_m,force_N", *rows]) + "\n", encoding="utf-8")
     found = fitted(path)
     assert found.friction_N == pytest.approx(FRICTION_N, abs=0.05)
+    assert not np.any(found.used & (np.abs(motion) != 1.0))
     places = np.linspace(0.01, 0.17, 17)
     expected = BREAKOUT_N + np.interp(places, NODES, FORCES[0.0])
     assert found.at(places, 0, 0.0) == pytest.approx(expected, abs=0.5)
