@@ -11,7 +11,6 @@ from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from coupled.units import FOOT_m
 
@@ -73,6 +72,7 @@ def _limit(i: int, left: float, at: float, low: float, high: float) -> str:
 
 def _least(accelerations: Accelerations, low: Floats, high: Floats, start: Floats) -> Floats:
     """Return the controls at which the accelerations are least, from a start."""
+    from scipy.optimize import least_squares  # only an aircraft that does not trim needs it
 
     def left(point: Floats) -> Floats:
         values = _FIRST * accelerations(point) / _STAYS
