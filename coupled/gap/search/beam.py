@@ -53,6 +53,7 @@ Try = tuple[tuple[Effect, ...], Start, Fit]  # effects, start values, parent
 Started = tuple[float, Fit, Fit]  # log evidence, unfinished fit, parent
 COARSE, OWN = Descent("coarse"), Descent("own")
 FIRST, SHORT = Descent("coarse", BEAM_FIRST), Descent("coarse", SHOOTINGS)
+VERY_STRONG = 5.0  # difference of log evidence, 2 ln B > 10: Kass and Raftery 1995
 ABOVE = (1.05, 1.5)  # starts of a breakaway force, over the running friction
 
 
@@ -119,8 +120,25 @@ class Beam:
     def valid(self) -> list[Names]:
         """Return the admissible sets (`is_admissible`)."""
         return [
-            n for n, fitted in self.fits.items() if not n or is_admissible(self.problem, fitted)
+            n
+            for n, fitted in self.fits.items()
+            if not n or is_admissible(self.problem, fitted, self._needed(n))
         ]
+
+    def _needed(self, names: Names) -> Names:
+        """Return the effects of a set without which the evidence is very much lower.
+
+        An interval by slopes may contain the neutral value of such an effect where dry friction
+        makes the residual discontinuous; the evidence of both sets is then the better test.
+        """
+        if not len(self.counts):
+            return frozenset()
+        here, others = self.log(names), {one: names - {one} for one in names}
+        return frozenset(
+            one
+            for one, rest in others.items()
+            if rest in self.known and here - self.log(rest) > VERY_STRONG
+        )
 
     def ranked(self) -> list[Names]:
         """Return the admissible sets, the one of highest evidence first."""
@@ -164,15 +182,15 @@ def names_of(effects: Iterable[Effect]) -> Names:
     return frozenset(effect.name for effect in effects)
 
 
-def is_admissible(problem: Problem, fitted: Fit) -> bool:
+def is_admissible(problem: Problem, fitted: Fit, needed: Names = frozenset()) -> bool:
     """Tell whether a fit is admissible.
 
-    The interval of each effect's size excludes the neutral value, no parameter is at a bound, and
-    no frequency is above the Nyquist frequency.
+    The interval of each effect's size excludes the neutral value, unless the effect is `needed`, no
+    parameter is at a bound, and no frequency is above the Nyquist frequency.
     """
     fastest = 0.5 * min(output.frame_rate_Hz for output in problem.outputs)
     for effect in fitted.effects:
-        if not _excludes_neutral(problem.case, fitted, effect):
+        if effect.name not in needed and not _excludes_neutral(problem.case, fitted, effect):
             return False
         for p in effect.free:
             key = effect.value_key(p)
