@@ -136,7 +136,7 @@ def _check(path: Path, rows: Sequence[Row], sweep: Sweep) -> None:
                 raise InputError(path, "", f"{problem}: half their difference is the friction")
     pull = sweep.deflection * sweep.force
     if float(np.sum(pull)) <= 0.0:
-        problem = "has forces against the deflections; a pull is positive in both"
+        problem = "has forces against the deflections, or none; a pull is positive in both"
         raise InputError(path, f"row {rows[int(np.argmin(pull))].number}", problem)
 
 
