@@ -98,12 +98,13 @@ def test_numbers_that_the_physics_cannot_give_are_refused_as_a_file_would_be() -
     assert possible(rig, "column", [BY_NAME["bend"]], stiff) is None
 
 
-def test_more_running_friction_than_breakaway_is_plain_friction() -> None:
+def test_more_running_friction_leaves_the_excess_of_the_breakaway_force() -> None:
+    """Friction that is added acts at rest, too: an axis with a third more has a third more there."""
     rig = bench({"friction_N": 1.0, "breakaway_N": 2.0})
     effect = BY_NAME["coulomb_friction"]
     more = apply(rig, "column", [effect], {"coulomb_friction.friction_N": 3.0})
     loader = more.controls["column"].loader
-    assert (loader.friction, loader.breakaway) == (4.0, 4.0)
+    assert (loader.friction, loader.breakaway) == (4.0, 5.0)
 
 
 def test_wheel_and_pedals_have_the_same_keys(flown: Rig) -> None:

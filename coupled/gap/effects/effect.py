@@ -245,7 +245,7 @@ def apply(
             changes[p.key] = p.entered(p.nominal(rig, control), value)
     for key, length in lengths.items():
         changes[key] = _level(rig, control, changes) / length if length > 0.0 else 0.0
-    changes |= _no_less_than_running(rig, control, changes)
+    changes |= _breakaway(rig, control, changes)
     data = rig.controls[control]
     changes["compensation.basic_gradient_N_per_{d}"] = data.assumed_basic_gradient
     changes["compensation.breakout_N"] = data.assumed_breakout
@@ -318,12 +318,13 @@ def _level(rig: Rig, control: ControlName, changes: Mapping[str, Any]) -> float:
     return running + 0.5 * sum(map(of, DIRECTIONS)) + LIGHT_LOAD_N * of(BY_LOAD)
 
 
-def _no_less_than_running(
-    rig: Rig, control: ControlName, changes: Mapping[str, Any]
-) -> dict[str, float]:
-    """Return the breakaway force raised to the running friction; a lower one is not valid."""
-    if FRICTION not in changes and BREAKAWAY not in changes:
+def _breakaway(rig: Rig, control: ControlName, changes: Mapping[str, Any]) -> dict[str, float]:
+    """Return the breakaway force that a change of the running friction moves with it.
+
+    Friction that is added adds at rest, too, so the excess of the breakaway force stays.
+    """
+    filed = float(value_of(rig, control, BREAKAWAY))
+    if FRICTION not in changes or BREAKAWAY in changes or filed == 0.0:
         return {}
-    running = float(changes.get(FRICTION, value_of(rig, control, FRICTION)))
-    breakaway = float(changes.get(BREAKAWAY, value_of(rig, control, BREAKAWAY)))
-    return {BREAKAWAY: running} if 0.0 < breakaway < running else {}
+    running = float(value_of(rig, control, FRICTION))
+    return {BREAKAWAY: float(changes[FRICTION]) + max(filed - running, 0.0)}

@@ -118,27 +118,36 @@ class Beam:
         return self.known[names].log(self.counts)
 
     def valid(self) -> list[Names]:
-        """Return the admissible sets (`is_admissible`)."""
-        return [
-            n
-            for n, fitted in self.fits.items()
-            if not n or is_admissible(self.problem, fitted, self._needed(n))
-        ]
+        """Return the admissible sets (`is_admissible`), those of fewest parameters first."""
+        valid = list[Names]()
+        for names in sorted(self.fits, key=lambda one: _numbers(self.fits[one])):
+            fitted = self.fits[names]
+            if not names or is_admissible(self.problem, fitted, self._needed(fitted, valid)):
+                valid.append(names)
+        return valid
 
-    def _needed(self, names: Names) -> Names:
-        """Return the effects of a set without which the evidence is very much lower.
+    def _needed(self, fitted: Fit, valid: Sequence[Names]) -> Names:
+        """Return the effects of a set that no simpler admissible set can do without.
 
-        An interval by slopes may contain the neutral value of such an effect where dry friction
-        makes the residual discontinuous; the evidence of both sets is then the better test.
+        The interval by slopes of such an effect may contain the neutral value where dry friction
+        makes the residual discontinuous; the evidence is then the better test. It must be very much
+        higher than that of each set of fewer parameters without the effect, and without a law that
+        contains it.
         """
         if not len(self.counts):
             return frozenset()
-        here, others = self.log(names), {one: names - {one} for one in names}
-        return frozenset(
-            one
-            for one, rest in others.items()
-            if rest in self.known and here - self.log(rest) > VERY_STRONG
-        )
+        numbers, here = _numbers(fitted), self.log(names_of(fitted.effects))
+        simpler = [n for n in valid if _numbers(self.fits[n]) < numbers]
+
+        def is_needed(effect: Effect) -> bool:
+            without = (
+                self.log(names)
+                for names in simpler
+                if not any(e is effect or contains(e, effect) for e in self.fits[names].effects)
+            )
+            return here - max(without, default=here) > VERY_STRONG
+
+        return frozenset(effect.name for effect in fitted.effects if is_needed(effect))
 
     def ranked(self) -> list[Names]:
         """Return the admissible sets, the one of highest evidence first."""
