@@ -99,7 +99,7 @@ def test_numbers_that_the_physics_cannot_give_are_refused_as_a_file_would_be() -
 
 
 def test_more_running_friction_leaves_the_excess_of_the_breakaway_force() -> None:
-    """Friction that is added acts at rest, too: an axis with a third more has a third more there."""
+    """Friction that is added acts at rest, too: an axis with a third more has that there."""
     rig = bench({"friction_N": 1.0, "breakaway_N": 2.0})
     effect = BY_NAME["coulomb_friction"]
     more = apply(rig, "column", [effect], {"coulomb_friction.friction_N": 3.0})
