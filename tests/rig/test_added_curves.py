@@ -12,6 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from coupled.authority.held import breakaway_force
+from coupled.authority.stability.limits import gradient_range
 from coupled.authority.stability.local import about_rest
 from coupled.errors import InputError
 from coupled.exporting.keys import check_keys
@@ -19,6 +21,8 @@ from coupled.flight.manoeuvre import configure
 from coupled.rig.curves import BendCurve, CommandCurve, Curve, FrictionCurve
 from coupled.rig.declaration import Hand
 from coupled.rig.frame import step_frame
+from coupled.rig.imposed import answer_to
+from coupled.rig.nodes import on_nodes
 from coupled.rig.packing import pack
 from coupled.rig.piecewise import along, count_of, damping_table, solve_along, table_of
 from coupled.rig.replay import replay_surface
@@ -274,6 +278,35 @@ def test_a_force_through_a_damping_of_several_segments_settles_at_its_speed() ->
         assert 75.0 * abs(speed) + level == pytest.approx(abs(force), rel=1e-9)
 
 
+def test_friction_is_not_below_zero_by_a_curve() -> None:
+    rubs = {"friction_N": 2.0}
+    least, less = (
+        {**rubs, "friction_curve": {"rate_m_per_s": [0.0, 1.0], "force_N": [level, level]}}
+        for level in (-2.0, -5.0)
+    )
+    assert flown(bench(less)).tobytes() == flown(bench(least)).tobytes()
+    one = {**rubs, "friction_curve": {"rate_m_per_s": [0.0, 1.0], "force_N": [-1.0, -1.0]}}
+    assert both({"friction_N": 1.0}, one, rubs) < LIMIT
+
+
+def test_an_imposed_motion_is_answered_with_damping_and_spring_of_curves() -> None:
+    time = np.arange(400) / RATE_Hz
+    way = 0.05 * np.sin(8.0 * time)
+
+    def answered(changes: dict[str, Any]) -> Floats:
+        rig = bench(changes)
+        return answer_to(rig, "column", on_nodes(rig, way), np.full(len(way), 560.0)).force
+
+    more = {
+        "friction_curve": {"rate_m_per_s": [0.0, 0.2, 0.5], "force_N": [0.0, 2.0, 20.0]},
+        "force_curve": line(*SPRING, 90.0, 0.05),
+    }
+    rate = 0.4 * np.cos(8.0 * time)
+    damped = np.sign(rate) * np.interp(np.abs(rate), [0.0, 0.2, 0.5], [0.0, 2.0, 20.0])
+    found = answered(more) - answered({})
+    np.testing.assert_allclose(found[5:-5], (damped + 90.0 * way)[5:-5], atol=0.02)
+
+
 def test_the_statics_have_each_curve() -> None:
     spring = line(*SPRING, 90.0, 0.1)
     bends = {"force_N": [0.0, 40.0, 80.0], "bend_m": [0.0, 1e-3, 5e-3]}
@@ -345,6 +378,16 @@ def test_a_rigid_structure_has_no_curve_and_small_motions_its_slope() -> None:
     with pytest.raises(InputError) as refused:
         about_rest(soft)
     assert refused.value.key == "controls.column.loader.force_curve"
+
+
+def test_the_range_of_gradients_and_the_breakaway_have_their_curves() -> None:
+    peak = {"dynamic_pressure_Pa": [0.0, 1500.0, 3000.0], "gradient_N_per_m": [0.0, 1800.0, 0.0]}
+    rub = {"rate_m_per_s": [0.0, 0.1], "force_N": [2.0, 9.0], "force_push_N": [4.0, 4.0]}
+    rig = bench({f"{SCHEDULE}.gradient_curve": peak, "friction_N": 1.0, "friction_curve": rub})
+    control = rig.controls["column"]
+    assert gradient_range(control) == pytest.approx((560.0, 0.5 * (560.0 + 2189.0) + 1800.0))
+    assert gradient_range(bench().controls["column"]) == (560.0, 2189.0)
+    assert breakaway_force(control.loader) == 1.0 + 4.0
 
 
 def test_a_rig_file_keeps_its_curves(tmp_path: Path) -> None:
