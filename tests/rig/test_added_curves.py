@@ -121,6 +121,11 @@ EQUAL: dict[str, tuple[dict[str, Any], dict[str, Any], dict[str, Any]]] = {
         {"load_curve": line("load_N", "friction_N", 0.2, 80.0)},
         {},
     ),
+    "friction at any load": (
+        {"friction_N": 3.0},
+        {"load_curve": {"load_N": [0.0, 50.0], "friction_N": [3.0, 3.0]}},
+        {},
+    ),
     "a bend": (
         {"bend_m_per_N": 3e-4},
         {"bend_curve": line("force_N", "bend_m", 3e-4 - 9.136e-5, 60.0)},
