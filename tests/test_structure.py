@@ -19,6 +19,7 @@ from coupled.flight.weather import Gust, Turbulence, Wind
 from coupled.record import channels
 from coupled.record.importing.mapping import Channel, Clock, Layout, LogMap
 from coupled.rig import parameters
+from coupled.rig.curves import Curve
 from coupled.rig.rig import Rig
 from coupled.rig.structure import Compliance, Structure
 from coupled.schema import Section, file_keys
@@ -141,7 +142,7 @@ def test_every_key_of_the_files_is_documented() -> None:
     sections: list[type[Section]] = [Rig, parameters.Flight, parameters.Control]
     sections += [parameters.Loader, parameters.Schedule, parameters.Compensation]
     sections += [parameters.Sensing, parameters.Gains, parameters.Calibration, parameters.Rigging]
-    sections += [parameters.Services]
+    sections += [parameters.Services, *Curve.__subclasses__()]
     sections += [Structure, Compliance]
     sections += [RunFile, PressureProfile, Wind, Gust, Turbulence, Event, Measure, Expect]
     sections += [SweepFile, Vary, Survive]

@@ -20,6 +20,12 @@ order.
 Friction may depend on the direction of motion and on the load (gears, worn guides): `pull` or
 `push`, and `by_load`·|F|, are added to the levels above. Rigid friction that depends on direction
 only is plain friction of the mean level and a constant force of half the difference.
+
+Curves add to it (`curves`): one by the load, and one by the rate, whose value at rest adds to
+`pull` and `push` and whose rise from there is a damping g(v), piecewise linear. The friction as a
+whole is not below zero. g is taken at the speed u of the step's middle. It is linear on a segment,
+g_i(v) + g_i'·(u − v), which is a force and a damping; u rises with the force, so the right segment
+is found by going from one to the next.
 """
 
 from __future__ import annotations
@@ -27,8 +33,20 @@ from __future__ import annotations
 import math
 from typing import Protocol
 
+import numpy as np
+from numpy.typing import NDArray
+
 from coupled.rig.compiled import TINY, layout, seldom, stage
 from coupled.rig.declaration import Declaration, Given
+from coupled.rig.piecewise import (
+    SHAPE,
+    along,
+    count_of,
+    damping_table,
+    segment,
+    solve_along,
+    table_of,
+)
 
 
 class FrictionParameters(Protocol):
@@ -47,6 +65,10 @@ class FrictionParameters(Protocol):
     dry: int  # whether there is any
     rigid: int  # and its contact is rigid
     varies: int  # with the direction or the load
+    load_nodes: int  # of the curve over the load; 0 without one
+    load_curve: NDArray[np.float64]  # N over N
+    rate_nodes: int  # of the damping's curve; 0 without one
+    rate_curve: NDArray[np.float64]  # g, N over d/s
 
 
 CONTACT_DAMPING = 0.3  # of √(stiffness·mass)
@@ -69,11 +91,21 @@ def _dry(given: Given) -> bool:
 
 def _varies(given: Given) -> bool:
     loader = given.control.loader
-    return max(loader.friction_pull, loader.friction_push, loader.friction_by_load) > 0.0
+    ahead, back = _at_rest(given)
+    added = (loader.friction_pull + ahead, loader.friction_push + back)
+    return any((*added, loader.friction_by_load, loader.load_curve.nodes))
+
+
+def _at_rest(given: Given) -> tuple[float, float]:
+    """Return the dry friction of the curve over the rate, of a motion aft and forward, N."""
+    curve = given.control.loader.friction_curve
+    if not curve.nodes:
+        return 0.0, 0.0
+    return curve.force[0], (curve.force_push or curve.force)[0]
 
 
 FRICTION = Declaration(
-    layout(FrictionParameters),
+    layout(FrictionParameters, load_curve=SHAPE, rate_curve=SHAPE),
     section="control.loader",
     derived={
         "running": lambda g: g.control.loader.friction,
@@ -83,13 +115,21 @@ FRICTION = Declaration(
         "contact_damping": lambda g: (
             CONTACT_DAMPING * math.sqrt(_stiffness(g) * g.control.loader.mass)
         ),
-        "pull": lambda g: g.control.loader.friction_pull,
-        "push": lambda g: g.control.loader.friction_push,
+        "pull": lambda g: g.control.loader.friction_pull + _at_rest(g)[0],
+        "push": lambda g: g.control.loader.friction_push + _at_rest(g)[1],
         "by_load": lambda g: g.control.loader.friction_by_load,
         "elastic_share": lambda g: g.control.loader.friction_elastic_share,
         "dry": _dry,
         "rigid": lambda g: _dry(g) and g.control.loader.friction_stiffness == 0.0,
         "varies": _varies,
+        "load_nodes": lambda g: count_of(g.control.loader.load_curve),
+        "load_curve": lambda g: table_of(g.control.loader.load_curve),
+        "rate_nodes": lambda g: (
+            2 * count_of(g.control.loader.friction_curve) - 1
+            if g.control.loader.friction_curve.nodes
+            else 0
+        ),
+        "rate_curve": lambda g: damping_table(g.control.loader.friction_curve),
     },
 )
 
@@ -114,7 +154,36 @@ def added_friction(p: FrictionParameters, load: float, direction: float) -> floa
     """Return the additions to friction by direction of motion and by load (N), N."""
     if p.varies == 0:
         return 0.0
-    return (p.pull if direction > 0.0 else p.push) + p.by_load * load
+    added = (p.pull if direction > 0.0 else p.push) + p.by_load * load
+    if p.load_nodes > 0:
+        added += along(p.load_curve, p.load_nodes, load)
+    return max(added, -p.running)
+
+
+@stage
+def carried(p: FrictionParameters, force: float, rubs: float) -> tuple[float, float]:
+    """Return the force of a slow motion with friction by load, N, and its slope over it, inverse.
+
+    `force` is that without load, its friction `rubs` included, N.
+    """
+    if p.load_nodes == 0:
+        share = 1.0 - p.by_load
+        return force / share, share
+    return _carried_along(p, force, rubs)
+
+
+@seldom
+def _carried_along(p: FrictionParameters, force: float, rubs: float) -> tuple[float, float]:
+    table, count = p.load_curve, p.load_nodes
+    wanted = force - along(table, count, 0.0)
+    by_load = solve_along(table, count, 1.0 - p.by_load, -1.0, wanted, -math.inf)
+    return by_load if by_load[0] > force - rubs else (force - rubs, 1.0)
+
+
+@stage
+def damping_along(p: FrictionParameters, rate: float) -> float:
+    """Return the part of the curve over the rate that vanishes at rest, N, signed as the rate."""
+    return along(p.rate_curve, p.rate_nodes, rate) if p.rate_nodes > 0 else 0.0
 
 
 @stage
@@ -269,6 +338,23 @@ def sliding_speed(
     `push` is the force without friction, N, `inertia` the inertia to be moved, N·s/d, `direction`
     the direction in which a rigid contact slides, `load` the load, N.
     """
+    if p.rate_nodes > 0:
+        return _speed_along(p, bent, v, push, direction, inertia, span, load)
+    return _sliding(p, bent, v, push, direction, inertia, span, load)
+
+
+@stage
+def _sliding(
+    p: FrictionParameters,
+    bent: float,
+    v: float,
+    push: float,
+    direction: float,
+    inertia: float,
+    span: float,
+    load: float,
+) -> tuple[float, float]:
+    """Return the same as `sliding_speed` without a curve over the rate."""
     if p.dry == 0:
         return v + push / inertia, 0.0
     if p.stiffness > 0.0:
@@ -278,3 +364,31 @@ def sliding_speed(
     if p.breakaway > p.running:  # Stribeck: a second iteration with the speed just found
         halfway = v + (push - running_friction(p, halfway) * direction) / inertia
     return halfway, 0.0
+
+
+@seldom
+def _speed_along(
+    p: FrictionParameters,
+    bent: float,
+    v: float,
+    push: float,
+    direction: float,
+    inertia: float,
+    span: float,
+    load: float,
+) -> tuple[float, float]:
+    """Return the same as `sliding_speed` with a curve over the rate: from segment to segment."""
+    table, last = p.rate_curve, p.rate_nodes - 2
+    i = segment(table, p.rate_nodes, v)
+    u, after = v, bent
+    for _ in range(p.rate_nodes):
+        slope = table[2, i]
+        level = table[1, i] + slope * (v - table[0, i])
+        u, after = _sliding(p, bent, v, push - level, direction, inertia + slope, span, load)
+        if u < table[0, i] and i > 0:
+            i -= 1
+        elif u > table[0, i + 1] and i < last:
+            i += 1
+        else:
+            break
+    return u, after

@@ -37,7 +37,12 @@ from coupled.rig.compiled import entry, stage
 from coupled.rig.control import ControlParameters
 from coupled.rig.events import sign
 from coupled.rig.frame import set_product
-from coupled.rig.friction import added_friction, deflect_bristles, running_friction
+from coupled.rig.friction import (
+    added_friction,
+    damping_along,
+    deflect_bristles,
+    running_friction,
+)
 from coupled.rig.inertia import set_inertia
 from coupled.rig.loader import LoaderState, set_external, start_loader
 from coupled.rig.modification import set_gradients
@@ -228,7 +233,8 @@ def _answer(
                 breakout = p.loader.breakout + (0.0 if p.loader.held else m.breakout)
                 answer[2, node] = 1.0
                 force = elastic(p.loader, m, loader, new) + loader.relaxed - loader.external
-                answer[0, node] = force + loader.damping * way / h + dry + breakout * sign(new)
+                force += loader.damping * way / h + damping_along(p.friction, way / h)
+                answer[0, node] = force + dry + breakout * sign(new)
                 if p.friction.rigid:
                     holds = running_friction(p.friction, 0.0)
                     answer[3, node] = holds + added_friction(p.friction, loader.load, -1.0) + dry

@@ -9,7 +9,8 @@
     backlash   the grip's side follows x once the play is taken up; with a contact stiffness the
                force moves it against spring and damper of the contact, which acts beyond the
                play only: k·τ·z' + k·(|z| − play/2)·sgn(z) = F, δ = x + z
-    bend       δ = x + K·F                     eq. (1); stiffening: limit·tanh(K·F/limit)
+    bend       δ = x + K·F                     eq. (1); stiffening: limit·tanh(K·F/limit);
+               a curve f(F), piecewise linear, adds to it (`curves`)
     direction  K for a pull, another for a push; both meet at F = 0
     hysteresis δ = x + (1 − s)·bend(F) + s·bend(P), P behind a play of full width w in the force:
                a cycle between ±A (A > w/2, one K) dissipates s·K·w·(2A − w)
@@ -35,6 +36,7 @@ from coupled.rig.command import CommandParameters, CommandState, commanded
 from coupled.rig.compiled import TINY, layout, stage
 from coupled.rig.declaration import Declaration, Given
 from coupled.rig.parameters import DELAY_SLOTS, Loader
+from coupled.rig.piecewise import SHAPE, along, count_of, slope_along, table_of
 
 CONTACT_s = 2e-3  # chosen: damping of a backlash's contact over its stiffness
 SMALL = 1e-6  # angle over a substep, rad, below which the servo counts as critically damped
@@ -51,6 +53,8 @@ class LinkageParameters(CommandParameters, Protocol):
     bend: float  # K of the structure, d/N, for a pull
     push: float  # and for a push
     bend_limit: float  # at which the bend saturates, d; 0 for none
+    curve_nodes: int  # of the bend's curve; 0 without one
+    curve: NDArray[np.float64]  # d over N
     share: float  # of the bend that follows the force through a play
     width: float  # full width of that play, N
     modal: int  # the structure has mass
@@ -131,7 +135,11 @@ _weights = lru_cache(maxsize=64)(servo_weights)
 
 
 LINKAGE = Declaration(
-    layout(LinkageParameters, position=(4,), speed=(4,), mode_position=(4,), mode_speed=(4,)),
+    layout(
+        LinkageParameters,
+        **dict.fromkeys(("position", "speed", "mode_position", "mode_speed"), (4,)),
+        curve=SHAPE,
+    ),
     section="control.loader",
     derived={
         "held": lambda g: g.control.drive == "setpoint",
@@ -141,6 +149,8 @@ LINKAGE = Declaration(
         "rate_limit": lambda g: g.control.loader.servo_rate_limit,
         "acceleration_limit": lambda g: g.control.loader.servo_acceleration_limit,
         "push": _push,
+        "curve_nodes": lambda g: count_of(g.control.loader.bend_curve),
+        "curve": lambda g: table_of(g.control.loader.bend_curve),
         "share": lambda g: g.control.loader.bend_hysteresis_share,
         "width": lambda g: g.control.loader.bend_hysteresis_width,
         "modal": lambda g: g.control.loader.bend_frequency > 0.0,
@@ -189,6 +199,14 @@ def move_linkage(
 @stage
 def bend(p: LinkageParameters, force: float) -> float:
     """Return the structure's bend in d under a force in N: K·F of eq. (1), with its saturation."""
+    if p.curve_nodes > 0:
+        return _plain_bend(p, force) + along(p.curve, p.curve_nodes, force)
+    return _plain_bend(p, force)
+
+
+@stage
+def _plain_bend(p: LinkageParameters, force: float) -> float:
+    """Return the bend without its curve, d."""
     compliance = p.bend if force >= 0.0 else p.push
     if p.bend_limit > 0.0:
         return p.bend_limit * math.tanh(compliance * force / p.bend_limit)
@@ -210,7 +228,9 @@ def static_slope(p: LinkageParameters, force: float) -> float:
     """Return the derivative of `bend` by the force, d/N, of a structure at rest."""
     compliance = p.bend if force >= 0.0 else p.push
     if p.bend_limit > 0.0:
-        return compliance / math.cosh(compliance * force / p.bend_limit) ** 2
+        compliance /= math.cosh(compliance * force / p.bend_limit) ** 2
+    if p.curve_nodes > 0:
+        compliance += slope_along(p.curve, p.curve_nodes, force)
     return compliance
 
 

@@ -32,6 +32,7 @@ from coupled.rig.events import NOTHING, REST, STOP, first_event, sign
 from coupled.rig.friction import FrictionParameters, added_friction, deflect_bristles, sliding_speed
 from coupled.rig.modification import ModificationState
 from coupled.rig.parameters import DELAY_SLOTS
+from coupled.rig.piecewise import SHAPE
 from coupled.rig.springs import (
     DERIVED,
     SpringParameters,
@@ -82,7 +83,7 @@ def stop_of(travel: float, stop: float) -> float:
 
 
 LOADER = Declaration(
-    layout(LoaderParameters),
+    layout(LoaderParameters, curve=SHAPE),
     section="control.loader",
     derived=DERIVED
     | {

@@ -14,6 +14,16 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, PlainValidator, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
+from coupled.rig.curves import (
+    BendCurve,
+    CommandCurve,
+    DeflectionReading,
+    ForceReading,
+    FrictionCurve,
+    GradientCurve,
+    LoadCurve,
+    SpringCurve,
+)
 from coupled.schema import Section, derived, named, quantity, text_like
 
 # A name usable in a file name: letters, digits, dot, dash, underscore.
@@ -81,6 +91,10 @@ class Loader(Section):
     play: float = quantity("{d}", 0.0, ge=0)
     play_stiffness: float = quantity("N_per_{d}", 0.0, ge=0)
     arc_geometry: bool = False
+    force_curve: SpringCurve = SpringCurve()
+    friction_curve: FrictionCurve = FrictionCurve()
+    load_curve: LoadCurve = LoadCurve()
+    bend_curve: BendCurve = BendCurve()
 
 
 class Schedule(Section):
@@ -99,6 +113,7 @@ class Schedule(Section):
     pressure_scale: float = quantity("", 1.0, gt=0)
     pressure_lag: float = quantity("s", 0.0, ge=0)
     slope: float = quantity("", 1.0, ge=0, le=100)
+    gradient_curve: GradientCurve = GradientCurve()
 
     @field_validator("total_gradient")
     @classmethod
@@ -179,6 +194,8 @@ class Sensing(Section):
     hum_phase: float = quantity("rad", 0.0)
     force_stamp: float = quantity("s", 0.0, ge=-0.5, le=0.5)
     gradient_skew: float = quantity("s", 0.0, ge=0)
+    deflection_curve: DeflectionReading = DeflectionReading()
+    force_curve: ForceReading = ForceReading()
 
     @property
     def read_scale(self) -> float:
@@ -194,6 +211,7 @@ class Rigging(Section):
     rate_limit: float = quantity("norm_per_s", 0.0, ge=0)
     play: float = quantity("norm", 0.0, ge=0)
     offset: float = quantity("norm", 0.0, ge=-1, le=1)
+    command_curve: CommandCurve = CommandCurve()
 
 
 class Services(Section):

@@ -31,11 +31,12 @@ from typing import Protocol
 
 from coupled.rig.compiled import layout, seldom, stage
 from coupled.rig.declaration import Declaration
-from coupled.rig.friction import FrictionParameters, added_friction
+from coupled.rig.friction import FrictionParameters, added_friction, carried
 from coupled.rig.hand import HandState
 from coupled.rig.linkage import (
     LinkageParameters,
     LinkageState,
+    bend,
     contact_displacement,
     deflection,
     static_slope,
@@ -43,6 +44,7 @@ from coupled.rig.linkage import (
 )
 from coupled.rig.loader import LoaderParameters, LoaderState
 from coupled.rig.modification import ModificationState, slope, smooth_force
+from coupled.rig.piecewise import solve_along
 from coupled.rig.springs import limited, spring, spring_slope
 
 _ITERATIONS = 40
@@ -76,7 +78,9 @@ REACH = Declaration(
 
 @stage
 def force_for_bend(p: LinkageParameters, by: float) -> float:
-    """Return the force in N for a bend of the structure, d: `bend` solved for F, K > 0."""
+    """Return the force in N for a bend of the structure, d: `bend` solved for F."""
+    if p.curve_nodes > 0:
+        return _force_along(p, by)
     compliance = p.bend if by >= 0.0 else p.push
     if compliance == 0.0:
         return _NO_FORCE if by > 0.0 else -_NO_FORCE
@@ -86,6 +90,35 @@ def force_for_bend(p: LinkageParameters, by: float) -> float:
             return _NO_FORCE if by > 0.0 else -_NO_FORCE
         return p.bend_limit / compliance * math.atanh(share)
     return by / compliance
+
+
+@seldom
+def _force_along(p: LinkageParameters, by: float) -> float:
+    """Return the force for a bend of a structure with a curve, N."""
+    side = 1.0 if by >= 0.0 else -1.0
+    if p.bend_limit == 0.0:
+        compliance, begin = (p.bend, 0.0) if by >= 0.0 else (p.push, -math.inf)
+        force, _ = solve_along(p.curve, p.curve_nodes, compliance, 1.0, by, begin)
+        return side * min(abs(force), _NO_FORCE)
+    outer = side
+    while side * (bend(p, outer) - by) < 0.0:
+        outer *= 2.0
+        if abs(outer) > _NO_FORCE:
+            return side * _NO_FORCE
+    inner = 0.0
+    for _ in range(_HALVINGS):
+        force = 0.5 * (inner + outer)
+        if side * (bend(p, force) - by) > 0.0:
+            outer = force
+        else:
+            inner = force
+    return inner
+
+
+@stage
+def _is_rigid(p: LinkageParameters, compliance: float) -> bool:
+    """Tell whether the structure does not bend on a side with this K, d/N."""
+    return compliance == 0.0 and p.curve_nodes == 0
 
 
 @seldom
@@ -107,8 +140,8 @@ def _place(
     force = level
     for _ in range(_ITERATIONS):
         at = x - side * s.neutral
-        force = level + side * spring(p, side * at) + limited(p, smooth_force(m, at))
-        force /= 1.0 - friction.by_load
+        force = level + side * (spring(p, side * at) + limited(p, smooth_force(m, side * at)))
+        force, share = carried(friction, force, rubs)
         ahead = still(linkage_p, linkage, side * force) + contact_displacement(
             linkage_p, side * force
         )
@@ -117,7 +150,7 @@ def _place(
             high = x
         else:
             low = x
-        stiffness = (spring_slope(p, side * at) + slope(m, at)) / (1.0 - friction.by_load)
+        stiffness = (spring_slope(p, side * at) + slope(m, side * at)) / share
         slope_of_yield = static_slope(linkage_p, side * force)
         if linkage_p.contact > 0.0:
             slope_of_yield += 1.0 / linkage_p.contact
@@ -242,7 +275,7 @@ def _most(
     outward, inward = linkage_p.bend, linkage_p.push
     if side < 0.0:
         outward, inward = inward, outward
-    if outward == 0.0 and linkage_p.contact == 0.0:
+    if _is_rigid(linkage_p, outward) and linkage_p.contact == 0.0:
         at, force = stop.top, stop.top_force
         if side < 0.0:
             at, force = stop.bottom, stop.bottom_force
@@ -251,7 +284,7 @@ def _most(
         return force
     servo = linkage.position if linkage_p.contact > 0.0 else linkage.grip
     by = side * p.reach - (servo + linkage.others)
-    if side * by < 0.0 and inward == 0.0 and linkage_p.contact == 0.0:
+    if side * by < 0.0 and _is_rigid(linkage_p, inward) and linkage_p.contact == 0.0:
         return 0.0  # it is beyond the reach, and no force bends it back
     if linkage_p.share > 0.0 or linkage_p.contact > 0.0:
         return _force_for_displacement(linkage_p, linkage, by, side)

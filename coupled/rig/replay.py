@@ -26,7 +26,7 @@ from coupled.rig.packing import crossed_bends, pack
 from coupled.rig.reach import bounds, set_reach
 from coupled.rig.rig import Rig
 from coupled.rig.schedule import gradients, read_pressure
-from coupled.rig.sensing import scale_at
+from coupled.rig.sensing import scaled_computed
 from coupled.rig.surface import command_surface
 
 Floats = NDArray[np.float64]
@@ -286,7 +286,7 @@ def _loader(
         set_gradients(p.modification, m, gradient[0, k], gradient[1, k])
         set_inertia(p.inertia, s.inertia, p.loader, s.loader, gradient[0, k])
         if missed[k] < 0.5:
-            read = scale_at(p.sensing, k) * s.loader.computed + misread[k]
+            read = scaled_computed(p.sensing, s.loader.computed, k) + misread[k]
         s.loader.neutral = neutral[k]
         out[1, k] = set_product(p, m, s.loader.computed - neutral[k], read - neutral[k])
         out[0, k] = s.loader.computed

@@ -14,6 +14,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any, ClassVar
 
+import numpy as np
 from pydantic import PrivateAttr, ValidationError
 
 from coupled.arguments import public
@@ -26,6 +27,7 @@ from coupled.record.channels import (
     unit_of,
 )
 from coupled.results import Result
+from coupled.rig.curves import check_curves
 from coupled.rig.guesses import check_guesses
 from coupled.rig.parameters import (
     DELAY_SLOTS,
@@ -263,6 +265,9 @@ def _check_control(rig: Rig, name: str, control: Control, file: object) -> None:
         raise InputError(
             file, f"{path}.length_m", "the arc's length must exceed 2/π of the travel on it"
         )
+    for part in ("loader", "schedule", "sensing", "rigging"):
+        check_curves(getattr(control, part), file, f"{path}.{part}", d)
+    _check_loader_curves(rig, control, file, f"{path}.loader", d)
     _check_servo(control, file, path)
     if loader.servo_frequency == 0.0:
         _check_without_servo(control, file, path, d)
@@ -272,6 +277,29 @@ def _check_control(rig: Rig, name: str, control: Control, file: object) -> None:
     _check_converters(control, file, path, d)
     _check_tolerance(control, file, path, d)
     check_guesses(control, file, path, d)
+
+
+def _check_loader_curves(rig: Rig, control: Control, file: object, path: str, d: str) -> None:
+    """Refuse curves by which the grip moves against the force, or which no step can follow."""
+    loader, rate_Hz = control.loader, rig.frame_rate * rig.substeps
+    sides = [loader.bend, loader.bend if loader.bend_push is None else loader.bend_push]
+    least = 0.0 if loader.bend_limit > 0.0 else min(sides)
+    if (slope := min(loader.bend_curve.slopes, default=0.0)) < -least:
+        problem = f"falls by {-slope:.3g} {d}/N, and K is {least:.3g} {d}/N: the grip may not move"
+        raise InputError(file, f"{path}.bend_curve.bend_{d}", f"{problem} against the force")
+    if (slope := max(loader.load_curve.slopes, default=0.0)) > 0.9 - loader.friction_by_load:
+        problem = f"rises by {slope:.3g} N/N; with friction_by_load it may rise by 0.9 at most"
+        raise InputError(file, f"{path}.load_curve.friction_N", problem)
+    most = loader.mass * rate_Hz**2  # half of what the implicit step can follow
+    if (slope := min(loader.force_curve.slopes, default=0.0)) < -most:
+        problem = f"falls by {-slope:.3g} N/{d}; at this mass and loader_rate_Hz give at most"
+        raise InputError(file, f"{path}.force_curve.force_N", f"{problem} {most:.3g}")
+    most, curve = loader.mass * rate_Hz, loader.friction_curve
+    other = curve.model_copy(update={"force": curve.force_push})
+    for key, one in (("force_N", curve), ("force_push_N", other)):
+        if one.values and (slope := min(one.slopes, default=0.0)) < -most:
+            problem = f"falls by {-slope:.3g} N·s/{d}; at this mass and loader_rate_Hz give at most"
+            raise InputError(file, f"{path}.friction_curve.{key}", f"{problem} {most:.3g}")
 
 
 def _check_tolerance(control: Control, file: object, path: str, d: str) -> None:
@@ -376,16 +404,17 @@ def _check_schedule(control: Control, file: object, path: str, d: str) -> None:
             f"{path}.loader.bend_{d}_per_N": control.loader.bend,
             f"{path}.loader.bend_push_{d}_per_N": control.loader.bend_push or 0.0,
         }
-    for (table_key, between), gradient in zip(tables, schedule.segments, strict=True):
+    for (filed_key, between), gradient in zip(tables, schedule.segments, strict=True):
         if len(gradient) != len(pressures):
             raise InputError(
                 file,
-                f"{key}.{table_key}",
+                f"{key}.{filed_key}",
                 f"has {len(gradient)} values, dynamic_pressure_Pa {len(pressures)}; give as many",
             )
         sloped = [gradient[0] + schedule.slope * (g - gradient[0]) for g in gradient]
+        table_key, sloped, places = _with_curve(schedule, filed_key, sloped)
         if min(sloped) < 0.0:
-            lowest = pressures[sloped.index(min(sloped))]
+            lowest = places[sloped.index(min(sloped))]
             problem = (
                 f"falls{between} at {lowest:g} Pa; a force may not fall as the deflection rises"
             )
@@ -393,7 +422,7 @@ def _check_schedule(control: Control, file: object, path: str, d: str) -> None:
             raise InputError(file, f"{key}.{table_key}", problem)
         for bend_key, bend in bends.items():
             if bend * max(sloped) >= 1.0:
-                where = pressures[sloped.index(max(sloped))]
+                where = places[sloped.index(max(sloped))]
                 limit = f"its gradient{between}" if between else table_key
                 raise InputError(
                     file,
@@ -403,6 +432,18 @@ def _check_schedule(control: Control, file: object, path: str, d: str) -> None:
                     f" {1.0 / max(sloped):.3g} {d}/N, or {limit} below {1.0 / bend:.4g}"
                     f"{f' N/{d}' if between else ''}",
                 )
+
+
+def _with_curve(
+    schedule: Schedule, key: str, sloped: list[float]
+) -> tuple[str, list[float], list[float]]:
+    """Return the key to blame, a segment's gradients with the curve added, and their pressures."""
+    pressures, curve = schedule.dynamic_pressure, schedule.gradient_curve
+    if not curve.nodes:
+        return key, sloped, pressures
+    places = sorted({0.0, *pressures, *curve.nodes})
+    table = np.interp(places, pressures, sloped) + curve.at(np.array(places))
+    return "gradient_curve", table.tolist(), places
 
 
 def _segments(schedule: Schedule, file: object, key: str, d: str) -> list[tuple[str, str]]:
@@ -453,7 +494,8 @@ def _check_converters(control: Control, file: object, path: str, d: str) -> None
     for name, scale in scales.items():
         if scale <= 0.0:
             raise InputError(file, f"{key}.{name}", "must be given where word_length_bits is")
-    travel = control.travel * sensing.read_scale  # as it is read
+    ends = sensing.deflection_curve.at(np.array([control.travel, -control.travel]))
+    travel = float(np.abs(ends).max()) * sensing.read_scale  # as it is read
     if sensing.s1 * travel > sensing.full_scale:
         factors = {key: getattr(sensing, key) for key in ("computed_scale", "deflection_scale")}
         off = [f"{key} = {factor:g}" for key, factor in factors.items() if factor != 1.0]

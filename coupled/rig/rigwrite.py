@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from coupled.record.channels import unit_of
+from coupled.rig.curves import Curve
 from coupled.rig.rigdata import RigData
 from coupled.schema import Section, file_keys
 
@@ -47,7 +48,7 @@ def section_table(section: Section, d: str) -> dict[str, Any]:
     found = {}
     for key, field in file_keys(type(section), d).items():
         value = getattr(section, field)
-        if value is not None:
+        if value is not None and not (isinstance(value, Curve) and not value.nodes):
             found[key] = section_table(value, d) if isinstance(value, Section) else value
     return found
 

@@ -4,7 +4,7 @@ G_T(q̄) is interpolated linearly in the rig's table and constant beyond its end
 gives the gradient beyond a break in deflection (appendix C of the report). A curve is a table of
 forces over q̄ and deflection; the force at each of its deflections is interpolated in the same way.
 Faults: the schedule's pressure lags or is wrong by a factor, or the table's rise above its value at
-q̄ = 0 is.
+q̄ = 0 is, or a curve over q̄ adds to the gradient of every segment (`curves`).
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from coupled.rig.compiled import layout, stage
 from coupled.rig.declaration import Declaration, Given, first_order_gain
 from coupled.rig.parameters import MAX_NODES, MAX_ROWS
+from coupled.rig.piecewise import SHAPE, along, count_of, table_of
 
 Table = NDArray[np.float64]
 
@@ -34,6 +35,8 @@ class ScheduleParameters(Protocol):
     pressure_scale: float  # q̄ in the schedule over the real one
     pressure_lag_gain: float  # 1 − exp(−T/τ) over a frame; 1 without lag
     slope: float  # factor on the rise above the value at q̄ = 0
+    added_nodes: int  # of the curve that adds to G_T; 0 without one
+    added: Table  # N/d over Pa
 
 
 class ScheduleState(Protocol):
@@ -63,7 +66,7 @@ def _forces(given: Given) -> Table:
 _NO_FORCES = np.zeros((MAX_NODES, MAX_ROWS))
 _SHAPES: dict[str, tuple[int, ...]] = {
     **dict.fromkeys(("dynamic_pressure", "total_gradient", "second_gradient"), (MAX_ROWS,)),
-    **{"deflection": (MAX_NODES,), "force": (MAX_NODES, MAX_ROWS)},
+    **{"deflection": (MAX_NODES,), "force": (MAX_NODES, MAX_ROWS), "added": SHAPE},
 }
 SCHEDULE = Declaration(
     layout(ScheduleParameters, **_SHAPES),
@@ -78,6 +81,8 @@ SCHEDULE = Declaration(
         "nodes": lambda g: len(g.control.schedule.deflection or ()),
         "deflection": lambda g: _rows(g.control.schedule.deflection or [], MAX_NODES),
         "force": _forces,
+        "added_nodes": lambda g: count_of(g.control.schedule.gradient_curve),
+        "added": lambda g: table_of(g.control.schedule.gradient_curve),
         "pressure_lag_gain": lambda g: first_order_gain(g.control.schedule.pressure_lag, g.frame_s),
     },
     state=layout(ScheduleState),
@@ -101,13 +106,19 @@ def gradients(p: ScheduleParameters, pressure: float) -> tuple[float, float]:
     """Return G_T below and beyond the break, N/d, at the schedule's pressure in Pa."""
     first = _interpolate(p, p.total_gradient, pressure)
     second = _interpolate(p, p.second_gradient, pressure)
+    if p.added_nodes > 0:
+        added = along(p.added, p.added_nodes, pressure)
+        return first + added, second + added
     return first, second
 
 
 @stage
 def force_at(p: ScheduleParameters, node: int, pressure: float) -> float:
     """Return the curve's force at one of its deflections, N, at the schedule's pressure in Pa."""
-    return _interpolate(p, p.force[node], pressure)
+    force = _interpolate(p, p.force[node], pressure)
+    if p.added_nodes > 0:
+        force += along(p.added, p.added_nodes, pressure) * p.deflection[node]
+    return force
 
 
 @stage

@@ -15,6 +15,9 @@ A gauge or a transducer may have a zero offset, and S₁ may drift: δc as read 
 S₁·(1 + rate·t_k)·δc over the assumed S₁. Mains hum may be added, hum·sin(2π·f·t_k + phase): the
 host reads it, too, and a converter sampled below 2·f aliases it. Late time stamps are an effect of
 the recorder (`recorder`).
+
+Gauge and transducer of δc may be nonlinear: a curve gives the reading over the true value, to which
+scale, offset, hum and noise are applied (`curves`).
 """
 
 from __future__ import annotations
@@ -23,9 +26,13 @@ import math
 from collections.abc import Callable
 from typing import Protocol
 
+import numpy as np
+from numpy.typing import NDArray
+
 from coupled.rig.compiled import layout, stage
 from coupled.rig.declaration import Declaration, Given
 from coupled.rig.parameters import Sensing
+from coupled.rig.piecewise import SHAPE, along, count_of, table_of
 
 
 class SensingParameters(Protocol):
@@ -50,6 +57,10 @@ class SensingParameters(Protocol):
     skewed: int  # δc or F is read before t_k
     computed_skew: float  # lead of the reading, in substeps
     force_skew: float
+    computed_nodes: int  # of the curve of δc as read; 0 without one
+    computed_curve: NDArray[np.float64]  # reading less true, d
+    force_nodes: int  # of the curve of F as read
+    force_curve: NDArray[np.float64]  # reading less true, N
 
 
 class SensingState(Protocol):
@@ -78,7 +89,7 @@ def _step(of: str) -> Callable[[Given], float]:
 
 
 SENSING = Declaration(
-    layout(SensingParameters),
+    layout(SensingParameters, computed_curve=SHAPE, force_curve=SHAPE),
     section="control.sensing",
     derived={
         "read_scale": lambda g: g.control.sensing.read_scale,
@@ -91,6 +102,10 @@ SENSING = Declaration(
         "skewed": lambda g: g.control.sensing.computed_skew + g.control.sensing.force_skew > 0.0,
         "computed_skew": lambda g: g.control.sensing.computed_skew / g.substep_s,
         "force_skew": lambda g: g.control.sensing.force_skew / g.substep_s,
+        "computed_nodes": lambda g: count_of(g.control.sensing.deflection_curve),
+        "computed_curve": lambda g: table_of(g.control.sensing.deflection_curve),
+        "force_nodes": lambda g: count_of(g.control.sensing.force_curve),
+        "force_curve": lambda g: table_of(g.control.sensing.force_curve),
     },
     state=layout(SensingState),
 )
@@ -126,6 +141,22 @@ def scale_at(p: SensingParameters, frame: int) -> float:
 
 
 @stage
+def scaled_computed(p: SensingParameters, computed: float, frame: int) -> float:
+    """Return δc by the host's transducer at a frame, d, without hum, noise and converter."""
+    if p.computed_nodes > 0:
+        computed += along(p.computed_curve, p.computed_nodes, computed)
+    return scale_at(p, frame) * computed
+
+
+@stage
+def scaled_force(p: SensingParameters, force: float) -> float:
+    """Return F by the gauge, N, without zero offset, noise and converter."""
+    if p.force_nodes > 0:
+        force += along(p.force_curve, p.force_nodes, force)
+    return p.force_scale * force
+
+
+@stage
 def hum_at(p: SensingParameters, frame: int) -> float:
     """Return the mains' hum in δc as read at a frame, d."""
     return p.hum * math.sin(p.hum_turn * frame + p.hum_phase)
@@ -134,7 +165,7 @@ def hum_at(p: SensingParameters, frame: int) -> float:
 @stage
 def read_computed(p: SensingParameters, computed: float, frame: int, noise: float) -> float:
     """Return δc as the host reads it, d: v₁ of eq. (2), by the assumed scale."""
-    read = scale_at(p, frame) * computed + noise
+    read = scaled_computed(p, computed, frame) + noise
     if p.hum != 0.0:
         read += hum_at(p, frame)
     return converted(read, p.computed_step, p.computed_range)
@@ -143,5 +174,5 @@ def read_computed(p: SensingParameters, computed: float, frame: int, noise: floa
 @stage
 def read_force(p: SensingParameters, force: float, noise: float) -> float:
     """Return F as the host reads it, N."""
-    read = p.force_scale * force + (noise + p.force_zero)
+    read = scaled_force(p, force) + (noise + p.force_zero)
     return converted(read, p.force_step, p.force_range)

@@ -2,6 +2,7 @@
 
     spring      G_B·δc + k₃·δc³
     ripple      + r·sin(2π·δc/period + phase)        cogging, teeth, a ball screw
+    curve       + f(δc)                              piecewise linear (`curves`)
     F_mod       limited to the actuator's force: −limit ≤ F_mod ≤ limit
     relaxation  + y,  y' = k·δc' − y/τ               a spring k in series with a damper k·τ
 
@@ -16,9 +17,13 @@ import math
 from collections.abc import Callable
 from typing import Any, Protocol
 
+import numpy as np
+from numpy.typing import NDArray
+
 from coupled.rig.compiled import stage
 from coupled.rig.declaration import Given, first_order_gain
 from coupled.rig.modification import ModificationState, modifying_force, slope, smooth_force
+from coupled.rig.piecewise import along, count_of, slope_along, table_of
 
 
 class SpringParameters(Protocol):
@@ -35,6 +40,8 @@ class SpringParameters(Protocol):
     digital: int  # F_mod is held over the frame
     lag_gain: float  # step response of F_mod's lag in half a substep; 0 without lag
     held: int  # F_mod does not follow δc within a substep: it is digital, or lags
+    curve_nodes: int  # of the spring's curve; 0 without one
+    curve: NDArray[np.float64]  # N over d
 
 
 class SpringState(Protocol):
@@ -59,6 +66,8 @@ DERIVED: dict[str, Callable[[Given], Any]] = {
     "digital": lambda g: g.control.loader.multiplier == "digital",
     "lag_gain": _half_step_gain,
     "held": lambda g: g.control.loader.multiplier == "digital" or _half_step_gain(g) > 0.0,
+    "curve_nodes": lambda g: count_of(g.control.loader.force_curve),
+    "curve": lambda g: table_of(g.control.loader.force_curve),
 }
 
 
@@ -69,9 +78,16 @@ def ripple(p: SpringParameters, x: float) -> float:
 
 
 @stage
+def curved(p: SpringParameters, x: float) -> float:
+    """Return the force of the spring's curve at δc = x, N."""
+    return along(p.curve, p.curve_nodes, x) if p.curve_nodes > 0 else 0.0
+
+
+@stage
 def spring(p: SpringParameters, x: float) -> float:
     """Return the force of the electronics' own springs at δc = x, N: F_L of eq. (8)."""
-    return (p.basic_gradient + p.cubic * x * x) * x + ripple(p, x)
+    own = (p.basic_gradient + p.cubic * x * x) * x + ripple(p, x)
+    return own + curved(p, x) if p.curve_nodes > 0 else own
 
 
 @stage
@@ -80,6 +96,8 @@ def spring_slope(p: SpringParameters, x: float) -> float:
     own = p.basic_gradient + 3.0 * p.cubic * x * x
     if p.ripple != 0.0:
         own += p.ripple * p.ripple_wave * math.cos(p.ripple_wave * x + p.ripple_phase)
+    if p.curve_nodes > 0:
+        own += slope_along(p.curve, p.curve_nodes, x)
     return own
 
 

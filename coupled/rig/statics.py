@@ -43,8 +43,8 @@ from coupled.rig.modification import (
 from coupled.rig.packing import crossed_bends, pack
 from coupled.rig.rig import Rig
 from coupled.rig.schedule import gradients
-from coupled.rig.sensing import converted, scale_at
-from coupled.rig.springs import limited, ripple
+from coupled.rig.sensing import converted, scaled_computed, scaled_force
+from coupled.rig.springs import curved, limited, ripple
 from coupled.rig.surface import static_command
 
 Floats = NDArray[np.float64]
@@ -89,12 +89,14 @@ def crossed(rig: Rig, control: str, others_N: Mapping[str, float]) -> Others:
     names = [str(name) for name in rig.controls]
     bends, assumed = crossed_bends(rig, control, names)
     force = np.array([others_N.get(name, 0.0) for name in names])
-    scale = np.array([data.sensing.force_scale for data in rig.controls.values()])
-    zero = np.array([data.sensing.force_zero for data in rig.controls.values()])
+    gauges = [data.sensing for data in rig.controls.values()]
+    scaled = [
+        g.force_scale * float(g.force_curve.at(f)) for g, f in zip(gauges, force, strict=True)
+    ]
+    read = np.array(scaled) + np.array([gauge.force_zero for gauge in gauges])
     share = np.array(
         leaks(control, rig.controls[cast(ControlName, control)].loader.crosstalk, names)
     )
-    read = scale * force + zero
     return Others(float(bends @ force), float(assumed @ read), float(share @ force))
 
 
@@ -169,10 +171,10 @@ def _line(
 
 
 @stage
-def _set(p: ControlParameters, s: ControlState, pressure: float) -> float:
-    """Set the modification of the state's frame; return δc as read over δc."""
+def _set(p: ControlParameters, s: ControlState, pressure: float) -> int:
+    """Set the modification of the state's frame; return that frame."""
     m, sensing = s.modification, p.sensing
-    read = scale_at(sensing, m.frames)
+    frame = m.frames
     seen = p.schedule.pressure_scale * pressure
     first, second = gradients(p.schedule, seen)
     set_gradients(p.modification, m, first, second)
@@ -183,19 +185,21 @@ def _set(p: ControlParameters, s: ControlState, pressure: float) -> float:
     elif p.modification.digital == 0:
         m.first = converted(m.first, sensing.gradient_step, sensing.gradient_range)
         m.second = converted(m.second, sensing.gradient_step, sensing.gradient_range)
-    return read
+    return int(frame)
 
 
 @stage
 def _force(
-    p: ControlParameters, s: ControlState, computed: float, read: float, side: float
+    p: ControlParameters, s: ControlState, computed: float, frame: int, side: float
 ) -> float:
-    """Return F in N at δc in d, beyond the breakout on a side; the host reads δc times `read`."""
+    """Return F in N at δc in d, beyond the breakout on a side, at a frame."""
     m, most = s.modification, p.sensing.product_range
     force = side * p.loader.breakout + loader_force(p.loader.basic_gradient, computed)
     force += p.loader.cubic * computed**3 + ripple(p.loader, computed) - p.loader.offset
+    force += curved(p.loader, computed)
     if p.modification.digital:
-        product = smooth_force(m, read * computed) + side * m.breakout
+        read = scaled_computed(p.sensing, computed, frame)
+        product = smooth_force(m, read) + side * m.breakout
         if most > 0.0:
             product = min(max(product, -most), most)
         return force + limited(p.loader, product)
@@ -216,10 +220,10 @@ def _along(
 ) -> None:
     """Write F in N at each δc, shape (n,), with `leaked` as others' crosstalk on the loader, N."""
     p, s = controls[0].parameters, controls[0].state
-    read = _set(p, s, pressure)
+    frame = _set(p, s, pressure)
     for i in range(len(computed)):
         side = 1.0 if computed[i] > 0.0 else -1.0
-        out[i] = _force(p, s, computed[i], read, side) - leaked
+        out[i] = _force(p, s, computed[i], frame, side) - leaked
 
 
 @entry
@@ -237,11 +241,11 @@ def _made_of(
     `beside` is the bend by other controls' forces, and the host's correction for it, d.
     """
     p = controls[0].parameters
-    read = scale_at(p.sensing, frame)
     for i in range(len(computed)):
         out[0, i] = computed[i] + _yields(p.linkage, force[i]) + beside[0]
-        force_read = p.sensing.force_scale * force[i] + p.sensing.force_zero
-        made = estimate(p.compensation, read * computed[i], force_read) + beside[1]
+        force_read = scaled_force(p.sensing, force[i]) + p.sensing.force_zero
+        read = scaled_computed(p.sensing, computed[i], frame)
+        made = estimate(p.compensation, read, force_read) + beside[1]
         out[1, i] = made
         out[2, i] = static_command(p.surface, made, pressure) + p.surface.offset
 
@@ -273,16 +277,16 @@ def _point_at(
     If the loader is held still, at neutral or at its stop, the structure alone determines F.
     """
     p, s = controls[0].parameters, controls[0].state
-    read = _set(p, s, pressure)
-    up = _force(p, s, 0.0, read, 1.0) - leaked
-    down = _force(p, s, 0.0, read, -1.0) - leaked
+    frame = _set(p, s, pressure)
+    up = _force(p, s, 0.0, frame, 1.0) - leaked
+    down = _force(p, s, 0.0, frame, -1.0) - leaked
     side = 1.0
     if deflection <= _yields(p.linkage, up):
         if deflection >= _yields(p.linkage, down):
             return 0.0, _force_for(p.linkage, deflection, down, up)
         side = -1.0
     near, far = 0.0, p.loader.aft if side > 0.0 else p.loader.forward
-    stopped = _force(p, s, side * far, read, side) - leaked
+    stopped = _force(p, s, side * far, frame, side) - leaked
     over = side * (deflection - side * far - _yields(p.linkage, stopped))
     if over > 0.0:
         most = side * (abs(stopped) + 1.0)
@@ -295,7 +299,7 @@ def _point_at(
     while True:
         middle = 0.5 * (near + far)
         x = side * middle
-        force = _force(p, s, x, read, side) - leaked
+        force = _force(p, s, x, frame, side) - leaked
         if middle in (near, far):
             return x, force
         if side * (x + _yields(p.linkage, force) - deflection) > 0.0:

@@ -1,6 +1,7 @@
 """Surface: from the host's estimate of the deflection to a command for the model.
 
-    u = sign·δ̂/travel, clipped to ±1            the linkage; the travel of a pull or of a push
+    u = sign·f(δ̂/travel), clipped to ±1         the linkage; the travel of a pull or of a push; f is
+                                                the identity or a curve (`curves`)
     cable stretch   u/(1 + loss·q̄)              under air load
     lag             τ·y' = u − y
     rate limit      |y'| ≤ rate
@@ -12,6 +13,7 @@ The result is added to the trim. All are in command units: 1 is the whole travel
 
 from __future__ import annotations
 
+import math
 from typing import Protocol
 
 import numpy as np
@@ -20,6 +22,7 @@ from numpy.typing import NDArray
 from coupled.rig.compiled import TINY, layout, stage
 from coupled.rig.declaration import Declaration, first_order_gain
 from coupled.rig.parameters import Control
+from coupled.rig.piecewise import SHAPE, along, count_of, table_of
 
 
 class SurfaceParameters(Protocol):
@@ -32,6 +35,8 @@ class SurfaceParameters(Protocol):
     rate_step: float  # largest motion in a frame; 0 for no limit
     play: float  # full width
     offset: float
+    curve_nodes: int  # of the command's curve; 0 without one
+    curve: NDArray[np.float64]  # command less share of the travel, pull positive
 
 
 class SurfaceState(Protocol):
@@ -46,7 +51,7 @@ class SurfaceState(Protocol):
 COMMAND_SIGN = {"elevator": -1.0, "aileron": 1.0, "rudder": -1.0}
 
 SURFACE = Declaration(
-    layout(SurfaceParameters),
+    layout(SurfaceParameters, curve=SHAPE),
     section="control.rigging",
     derived={
         "gain": lambda g: COMMAND_SIGN[g.control.surface] / g.control.pull,
@@ -54,6 +59,8 @@ SURFACE = Declaration(
         "stretch": lambda g: g.control.rigging.stretch_loss,
         "lag_gain": lambda g: first_order_gain(g.control.rigging.lag, g.frame_s),
         "rate_step": lambda g: g.control.rigging.rate_limit * g.frame_s,
+        "curve_nodes": lambda g: count_of(g.control.rigging.command_curve),
+        "curve": lambda g: table_of(g.control.rigging.command_curve),
     },
     state=layout(SurfaceState),
 )
@@ -69,7 +76,11 @@ def share_of_travel(control: Control, deflection: NDArray[np.float64]) -> NDArra
 def static_command(p: SurfaceParameters, estimate: float, dynamic_pressure: float) -> float:
     """Return the linkage's command, in ±1, for δ̂ in d and q̄ in Pa."""
     gain = p.gain if estimate > 0.0 else p.gain_push
-    commanded = min(max(gain * estimate, -1.0), 1.0)
+    asked = gain * estimate
+    if p.curve_nodes > 0:
+        sign = math.copysign(1.0, gain)
+        asked += sign * along(p.curve, p.curve_nodes, sign * asked)
+    commanded = min(max(asked, -1.0), 1.0)
     return commanded / (1.0 + p.stretch * dynamic_pressure)
 
 

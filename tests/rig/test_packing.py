@@ -47,6 +47,24 @@ RIG = bench(
         f"{HOST}.mass_factor": [1.0, 0.8],
         f"{HOST}.damping_factor": [1.0, 0.9],
         f"{HOST}.force_lead_s": [0.0, 0.02],
+        "force_curve": {"deflection_m": [0.0, 0.1], "force_N": [0.0, 2.0]},
+        "friction_curve": {
+            "rate_m_per_s": [0.0, 0.1],
+            "force_N": [1.0, 2.0],
+            "force_push_N": [1.0, 3.0],
+        },
+        "load_curve": {"load_N": [0.0, 50.0], "friction_N": [0.0, 5.0]},
+        "bend_curve": {"force_N": [0.0, 50.0], "bend_m": [0.0, 1e-3]},
+        f"{SCHEDULE}.gradient_curve": {
+            "dynamic_pressure_Pa": [0.0, 3000.0],
+            "gradient_N_per_m": [0.0, 9.0],
+        },
+        f"{SENSING}.deflection_curve": {"deflection_m": [0.0, 0.1], "reading_m": [0.0, 0.11]},
+        f"{SENSING}.force_curve": {"force_N": [0.0, 60.0], "reading_N": [0.0, 61.0]},
+        "controls.column.rigging.command_curve": {
+            "deflection_norm": [0.0, 1.0],
+            "command_norm": [0.0, 0.9],
+        },
     }
 )
 COLUMN = RIG.controls["column"]
