@@ -185,7 +185,7 @@ def _flexible(case: Case, found: Fit, one: Acts) -> tuple[float, float]:
     These are the share of the nonparametric model's residual power that the effect removes, and
     that residual power, without the effect, over the power that the effects leave.
     """
-    known = signals(one.output.stage, one.record, case.control, one.output.frame_rate_Hz)
+    known = signals(one.output, one.left, one.record, case.control)
     answers = response(one.output, found.rig, one.record, case.control)
     leaves = []
     for left in (one.left, one.left + one.action):
