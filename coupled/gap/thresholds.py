@@ -13,6 +13,7 @@ OTHER_PATH_rad = 0.01  # chosen: of its flight path, likewise
 OTHER_RATE = 1e-3  # chosen: relative error of the frame rate, likewise
 STAMP_JITTER = 0.01  # chosen: of a frame, by which a row's time may be off
 SHORTEST_RECORD_s = 5.0  # two stretches of 2.5 s: one to fit, one to hold out
+SHORT_SWINGS = 4  # of a shorter record: both halves then hold motion in both directions
 
 # Noise and rounding of a channel (`output`).
 SOURCE_FRAMES = 12  # chosen: delays over which noise is regressed on its source

@@ -263,6 +263,9 @@ def _check_control(rig: Rig, name: str, control: Control, file: object) -> None:
         raise InputError(
             file, f"{path}.length_m", "the arc's length must exceed 2/π of the travel on it"
         )
+    if loader.gravity > 0.0 and d == "m":
+        problem = "acts on an axis that turns; this control moves along a line"
+        raise InputError(file, f"{path}.loader.gravity_N", problem)
     _check_servo(control, file, path)
     if loader.servo_frequency == 0.0:
         _check_without_servo(control, file, path, d)
