@@ -206,6 +206,9 @@ RIPPLE_LEAST = 1.5  # chosen: least periods within the deflections; fewer are pa
 RIPPLE_PERIODS, RIPPLES_TRIED = 60.0, 4  # chosen: most periods, and number of ripples tried
 
 # Alternatives, and the model error (`beam`, `problem`).
+# Difference of log-likelihood "not worth more than a bare mention" (Kass and Raftery, J. Am.
+# Statist. Assoc. 90, 1995): effects within it are equivalent.
+SAME_LIKELIHOOD = 1.0
 RIVAL_GAIN = 4.0  # chosen: least log evidence of the best set over a set that is no alternative
 MISMATCH = 0.03  # chosen: model error of a right effect, share of the gap
 
