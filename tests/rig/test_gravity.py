@@ -43,3 +43,16 @@ def test_at_rest_and_under_imposed_motion_the_force_is_that_of_the_weight() -> N
 def test_a_control_that_moves_along_a_line_has_none() -> None:
     with pytest.raises(InputError, match=r"gravity_N: acts on an axis that turns"):
         bench({"gravity_N": 3.0})
+
+
+@pytest.mark.parametrize("frame_Hz", [25.0, 10_000.0])
+def test_logs_of_slow_and_of_fast_machines_are_replayed(frame_Hz: float) -> None:
+    """At 10 kHz the loader takes one step a frame, at 25 Hz eighty."""
+    times = np.arange(round(1.2 * frame_Hz)) / frame_Hz
+    rig, zeros = pendulum_rig({"frame_rate_Hz": frame_Hz}), np.zeros(len(times))
+    assert rig.substeps == (1 if frame_Hz > 2000.0 else 80)
+    steps = np.arange(len(times) * rig.substeps + 1)
+    found = drive_loader(
+        rig, "wheel", 9.0 * np.sin(4.0 * steps / (frame_Hz * rig.substeps)), zeros, zeros
+    )[0]
+    assert np.max(np.abs(found - swing(times))) < 1e-5
