@@ -28,7 +28,7 @@ from coupled.gap.findings.credibility import (
 from coupled.gap.findings.flexible import free_share
 from coupled.gap.findings.regimes import Acts, Regime, _regime, _size, regimes
 from coupled.gap.findings.result import EffectResult, StageResult
-from coupled.gap.findings.where import signals
+from coupled.gap.findings.where import Remains, signals
 from coupled.gap.search.case import Case
 from coupled.gap.search.problem import Problem
 from coupled.gap.signals.output import Output
@@ -438,3 +438,20 @@ def test_the_force_of_an_imposed_motion_is_no_condition_on_itself() -> None:
     }
     assert known["size of force_N"].p_value < 1e-6
     assert free_share(other, acts.left, signals(other, acts.left, read, "column"))[0] > 0.5
+
+
+def test_what_no_function_of_the_signals_predicts_is_no_evidence_against_a_law() -> None:
+    """A machine's own error: a nonparametric model beside the effects leaves it as well."""
+    assert remainder(15.0, 5.0, BOUND, 1.0) > 0.8
+    assert remainder(15.0, 5.0, BOUND, 5.0) == 0.0
+    own = np.linspace(1.0, 5.0, 401)
+    known = np.array([remainder(15.0, 5.0, BOUND, one) for one in own])
+    assert np.all(np.diff(known) <= 0.0)
+    assert np.max(-np.diff(known)) < 0.06
+
+    def stage(free_share: float) -> StageResult:
+        remains = Remains(5.0, (), 1.0, free_share, "all")
+        return StageResult("loader", 15.0, 15.0, BOUND, 5.0, guilty=True, remains=remains)
+
+    assert stage(0.0).remainder < 1e-12
+    assert stage(1.0).remainder == replace(stage(1.0), remains=None).remainder > 0.8
