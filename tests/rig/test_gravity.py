@@ -17,7 +17,7 @@ from tests.support.rigs import bench
 def test_a_link_swings_as_a_pendulum_and_the_steps_are_of_second_order() -> None:
     frame_Hz = 100.0
     times = np.arange(301) / frame_Hz
-    exact, zeros, off = swing(times), np.zeros(len(times)), []
+    exact, zeros, off = swing(times), np.zeros(len(times)), list[float]()
     assert np.ptp(exact) > 1.0  # sin is far from a line
     for rate_Hz in (2000.0, 8000.0):
         rig = pendulum_rig({"loader_rate_Hz": rate_Hz})

@@ -79,10 +79,11 @@ def _fitted_in_place(
     The changes are alike if the cosine between them exceeds 1 − `ALIKE`.
     """
     outputs = touched(case.outputs, [effect])
+    stages = {output.stage for output in outputs}
     if len(effect.free) != 1 or STAGE_OF[effect.stage].flown:
         return []
     rest = tuple(one for one in found.effects if one is not effect)
-    taken, problem, fits = keys_of(found.effects), Problem(case), []
+    taken, problem, fits = keys_of(found.effects), Problem(case), list[Fit]()
 
     def residual(rig: Rig) -> Floats:
         return np.concatenate([output.residual(rig, coarse=True) for output in outputs])
@@ -90,8 +91,8 @@ def _fitted_in_place(
     without = residual(case.with_only(found, rest))
     action = without - residual(found.rig)
     for other in library:
-        same = len(other.free) == 1 and touched(case.outputs, [other]) == outputs
-        if not same or not taken.isdisjoint(keys_of([other])):
+        shown = {output.stage for output in touched(case.outputs, [other])}
+        if len(other.free) != 1 or shown != stages or not taken.isdisjoint(keys_of([other])):
             continue
         (p,) = other.free
         none = p.neutral(case.nominal, case.control)
@@ -107,5 +108,6 @@ def _fitted_in_place(
         low, high = p.bounds(case.nominal, case.control)
         value = none + (start - none) * along / size
         begun = values | {key: min(max(value, low), high)}
-        fits.append(problem.fit((*rest, other), begun, None, Descent("own")))
+        fit = problem.fit((*rest, other), begun, None, Descent("own"))
+        fits += [fit] if key not in fit.at_bound else []
     return fits
