@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from coupled.errors import InputError
 from coupled.gap.thresholds import (
     OTHER_RATE,
     OTHER_RIG,
     OTHER_SPEED,
+    PIECE,
+    SHORT_SWINGS,
     STAMP_JITTER,
     SHORTEST_RECORD_s,
 )
@@ -18,6 +21,7 @@ from coupled.record.record import Record
 from coupled.rig.equations import specified_gradient
 from coupled.rig.rig import Rig
 
+Floats = NDArray[np.float64]
 SPEED = "true_airspeed_m_per_s"
 START_ROWS = 12  # chosen: a tenth of a second at 120 Hz, before a pilot has changed the motion
 
@@ -41,14 +45,30 @@ def check_record(rig: Rig, record: Record, control: ControlName, file: object) -
     if gap.size:
         raise InputError(file, "time_s", f"has a gap or a jump after {time[gap[0]]:.3f} s")
     if len(time) < SHORTEST_RECORD_s * rig.frame_rate:
-        raise InputError(
-            file, "", f"is {time[-1] - time[0]:.1f} s long; {SHORTEST_RECORD_s:g} s are needed"
-        )
+        _check_short(record, control, file)
     for name in record.channels:
         if not np.all(np.isfinite(record[name])):
             row = int(np.argmax(~np.isfinite(record[name])))
             raise InputError(file, name, f"row {row + 2} holds no number")
     _check_channels(rig, record, control, file)
+
+
+def _check_short(record: Record, control: ControlName, file: object) -> None:
+    """Raise InputError if a short record has too few frames or swings to fit and to hold out."""
+    names = [channel(control, q) for q in ("force", "computed", "deflection")]
+    swings = min((_swings(record[name]) for name in names if name in record), default=0)
+    if len(record) < 2 * PIECE or swings < SHORT_SWINGS:
+        length_s = record.time_s[-1] - record.time_s[0]
+        problem = f"is {length_s:.1f} s long with {swings} swings in {len(record)} rows;"
+        needed = f"{SHORTEST_RECORD_s:g} s are needed, or {SHORT_SWINGS} swings in {2 * PIECE} rows"
+        raise InputError(file, "", f"{problem} {needed}")
+
+
+def _swings(signal: Floats) -> int:
+    """Return how often a signal crosses its mean by half of its standard deviation or more."""
+    away = signal - signal.mean()
+    sides = np.sign(away[np.abs(away) > 0.5 * away.std()])
+    return int(np.count_nonzero(np.diff(sides)))
 
 
 def _check_channels(rig: Rig, record: Record, control: ControlName, file: object) -> None:

@@ -13,6 +13,7 @@ OTHER_PATH_rad = 0.01  # chosen: of its flight path, likewise
 OTHER_RATE = 1e-3  # chosen: relative error of the frame rate, likewise
 STAMP_JITTER = 0.01  # chosen: of a frame, by which a row's time may be off
 SHORTEST_RECORD_s = 5.0  # two stretches of 2.5 s: one to fit, one to hold out
+SHORT_SWINGS = 4  # of a shorter record: both halves then hold motion in both directions
 
 # Noise and rounding of a channel (`output`).
 SOURCE_FRAMES = 12  # chosen: delays over which noise is regressed on its source
@@ -205,6 +206,9 @@ RIPPLE_LEAST = 1.5  # chosen: least periods within the deflections; fewer are pa
 RIPPLE_PERIODS, RIPPLES_TRIED = 60.0, 4  # chosen: most periods, and number of ripples tried
 
 # Alternatives, and the model error (`beam`, `problem`).
+# Difference of log-likelihood "not worth more than a bare mention" (Kass and Raftery, J. Am.
+# Statist. Assoc. 90, 1995): effects within it are equivalent.
+SAME_LIKELIHOOD = 1.0
 RIVAL_GAIN = 4.0  # chosen: least log evidence of the best set over a set that is no alternative
 MISMATCH = 0.03  # chosen: model error of a right effect, share of the gap
 

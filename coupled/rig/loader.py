@@ -72,7 +72,6 @@ class LoaderState(SpringState, DelayState, Protocol):
     bent: float  # deflection of a friction's contact, d
     leaked: float  # crosstalk of another control's force, N, at the next node
     external: float  # F_offset − b·(n_z − 1), N, held over the frame
-    neutral: float  # x₀, about which the springs act, d (`services`)
     loose: int  # the springs follow the control, without breakout
     stop: int  # the stop reached during this frame: −1, 0 or +1
 
@@ -161,7 +160,7 @@ def _midpoint(
     """
     v = s.rate
     middle = s.computed + 0.5 * span * v - s.neutral
-    inertia = 2.0 * s.mass / span + s.damping + 0.5 * span * stiffness(p, m, middle)
+    inertia = 2.0 * s.mass / span + s.damping + 0.5 * span * stiffness(p, m, s, middle)
     push -= elastic(p, m, s, middle) + s.damping * v
     if p.relaxing > 0.0:
         kept, damping = relaxing_mean(p, s, span)

@@ -64,6 +64,8 @@ class Loader(Section):
     ripple: float = quantity("N", 0.0)
     ripple_period: float = quantity("{d}", 0.01, gt=0)
     ripple_phase: float = quantity("rad", 0.0)
+    gravity: float = quantity("N", 0.0, ge=0)
+    gravity_angle: float = quantity("rad", 0.0)
     relaxing_stiffness: float = quantity("N_per_{d}", 0.0, ge=0)
     relaxing_time: float = quantity("s", 1.0, gt=0)
     force_limit: float = quantity("N", 0.0, ge=0)

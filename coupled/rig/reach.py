@@ -45,7 +45,7 @@ from coupled.rig.linkage import (
 from coupled.rig.loader import LoaderParameters, LoaderState
 from coupled.rig.modification import ModificationState, slope, smooth_force
 from coupled.rig.piecewise import solve_along
-from coupled.rig.springs import limited, spring, spring_slope
+from coupled.rig.springs import limited, spring, spring_slope, weight, weight_slope
 
 _ITERATIONS = 40
 _HALVINGS = 64  # to the last digit of a double
@@ -140,7 +140,8 @@ def _place(
     force = level
     for _ in range(_ITERATIONS):
         at = x - side * s.neutral
-        force = level + side * (spring(p, side * at) + limited(p, smooth_force(m, side * at)))
+        force = level + side * (spring(p, side * at) + weight(p, side * x))
+        force += side * limited(p, smooth_force(m, side * at))
         force, share = carried(friction, force, rubs)
         ahead = still(linkage_p, linkage, side * force) + contact_displacement(
             linkage_p, side * force
@@ -150,7 +151,8 @@ def _place(
             high = x
         else:
             low = x
-        stiffness = (spring_slope(p, side * at) + slope(m, side * at)) / share
+        stiffness = spring_slope(p, side * at) + weight_slope(p, side * x)
+        stiffness = (stiffness + slope(m, side * at)) / share
         slope_of_yield = static_slope(linkage_p, side * force)
         if linkage_p.contact > 0.0:
             slope_of_yield += 1.0 / linkage_p.contact

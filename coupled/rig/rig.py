@@ -268,6 +268,9 @@ def _check_control(rig: Rig, name: str, control: Control, file: object) -> None:
     for part in ("loader", "schedule", "sensing", "rigging"):
         check_curves(getattr(control, part), file, f"{path}.{part}", d)
     _check_loader_curves(rig, control, file, f"{path}.loader", d)
+    if loader.gravity > 0.0 and d == "m":
+        problem = "acts on an axis that turns; this control moves along a line"
+        raise InputError(file, f"{path}.loader.gravity_N", problem)
     _check_servo(control, file, path)
     if loader.servo_frequency == 0.0:
         _check_without_servo(control, file, path, d)

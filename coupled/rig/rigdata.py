@@ -18,7 +18,7 @@ class RigData(Section):
     """The sections of a rig file; SI."""
 
     name: PlainName
-    frame_rate: float = quantity("Hz", ge=1, le=2000)
+    frame_rate: float = quantity("Hz", ge=1, le=10_000)
     loader_rate: float = quantity("Hz", 2000.0, ge=2000, le=100_000)
     controls: dict[ControlName, Control]
     flight: Flight | None = None

@@ -3,12 +3,14 @@
     spring      G_B·δc + k₃·δc³
     ripple      + r·sin(2π·δc/period + phase)        cogging, teeth, a ball screw
     curve       + f(δc)                              piecewise linear (`curves`)
+    gravity     + g·sin(δc + angle)                  a link on a wheel, hanging at −angle
     F_mod       limited to the actuator's force: −limit ≤ F_mod ≤ limit
     relaxation  + y,  y' = k·δc' − y/τ               a spring k in series with a damper k·τ
 
-The loader's step uses their mean over the step. That of the relaxing spring is exact for a uniform
-motion: with a = τ·(1 − e^(−h/τ))/h it is a·y + (1 − a)·k·τ·u, u being the mean rate, so it enters
-the implicit step as a force and a damping. The others are evaluated at the step's middle.
+All but gravity act about the neutral of a trim. The loader's step uses their mean over the step.
+That of the relaxing spring is exact for a uniform motion: with a = τ·(1 − e^(−h/τ))/h it is
+a·y + (1 − a)·k·τ·u, u being the mean rate, so it enters the implicit step as a force and a damping.
+The others are evaluated at the step's middle.
 """
 
 from __future__ import annotations
@@ -34,6 +36,8 @@ class SpringParameters(Protocol):
     ripple: float  # N
     ripple_wave: float  # 2π over the period, 1/d
     ripple_phase: float  # rad
+    gravity: float  # weight of a link on a wheel, at a right angle to the vertical, N
+    gravity_angle: float  # of the link at δc = 0 from where it hangs, rad
     force_limit: float  # of the actuator's F_mod, N
     relaxing: float  # stiffness of the spring that relaxes, N/d
     relaxing_time: float  # τ, s
@@ -49,6 +53,7 @@ class SpringState(Protocol):
 
     applied: float  # F_mod on the loader if it is held, N
     relaxed: float  # y, N
+    neutral: float  # x₀, about which the springs act, d (`services`)
 
 
 def _half_step_gain(given: Given) -> float:
@@ -84,6 +89,18 @@ def curved(p: SpringParameters, x: float) -> float:
 
 
 @stage
+def weight(p: SpringParameters, computed: float) -> float:
+    """Return the force of gravity against δc, N; about the vertical, whatever the neutral."""
+    return p.gravity * math.sin(computed + p.gravity_angle) if p.gravity != 0.0 else 0.0
+
+
+@stage
+def weight_slope(p: SpringParameters, computed: float) -> float:
+    """Return the slope of `weight`, N/d."""
+    return p.gravity * math.cos(computed + p.gravity_angle) if p.gravity != 0.0 else 0.0
+
+
+@stage
 def spring(p: SpringParameters, x: float) -> float:
     """Return the force of the electronics' own springs at δc = x, N: F_L of eq. (8)."""
     own = (p.basic_gradient + p.cubic * x * x) * x + ripple(p, x)
@@ -111,15 +128,15 @@ def limited(p: SpringParameters, force: float) -> float:
 
 @stage
 def elastic(p: SpringParameters, m: ModificationState, s: SpringState, x: float) -> float:
-    """Return the smooth part of the force against δc = x, N: the springs', and F_mod."""
-    force = spring(p, x)
+    """Return the smooth part of the force against δc, x from neutral, N: springs and F_mod."""
+    force = spring(p, x) + weight(p, s.neutral + x)
     return force + (s.applied if p.held else limited(p, smooth_force(m, x)))
 
 
 @stage
-def stiffness(p: SpringParameters, m: ModificationState, x: float) -> float:
+def stiffness(p: SpringParameters, m: ModificationState, s: SpringState, x: float) -> float:
     """Return the slope of `elastic`, N/d."""
-    own = spring_slope(p, x)
+    own = spring_slope(p, x) + weight_slope(p, s.neutral + x)
     if p.held or (p.force_limit > 0.0 and abs(smooth_force(m, x)) >= p.force_limit):
         return own
     return own + slope(m, x)

@@ -2,7 +2,7 @@
 
 With breakout, two segments and a stiffening bend, over δc, the equilibrium of the loader is
 
-    F(δc) = F_BO + F_L + k₃·δc³ + ripple + F_mod − F_offset + b·(n_z − 1) − Σ_j leak_j·F_j
+    F(δc) = F_BO + F_L + k₃·δc³ + ripple + weight + F_mod − F_offset + b·(n_z − 1) − Σ_j leak_j·F_j
 
 which is eq. (9) solved for F; the structure δ = δc + bend(F), and with a soft backlash
 + sgn(F)·play/2 + F/k. F_mod is the multiplier's output: from δc with an analog one, from δc as the
@@ -44,7 +44,7 @@ from coupled.rig.packing import crossed_bends, pack
 from coupled.rig.rig import Rig
 from coupled.rig.schedule import gradients
 from coupled.rig.sensing import converted, scaled_computed, scaled_force
-from coupled.rig.springs import curved, limited, ripple
+from coupled.rig.springs import curved, limited, ripple, weight
 from coupled.rig.surface import static_command
 
 Floats = NDArray[np.float64]
@@ -197,6 +197,7 @@ def _force(
     force = side * p.loader.breakout + loader_force(p.loader.basic_gradient, computed)
     force += p.loader.cubic * computed**3 + ripple(p.loader, computed) - p.loader.offset
     force += curved(p.loader, computed)
+    force += weight(p.loader, computed)
     if p.modification.digital:
         read = scaled_computed(p.sensing, computed, frame)
         product = smooth_force(m, read) + side * m.breakout

@@ -82,6 +82,7 @@ UNSEEN = {
     "mains_hum": "readings are means",
     "crosstalk": "other controls are free",
     "arc_geometry": "0.7 % at 11° is within tolerance",
+    "gravity": "a column does not turn",
 }
 
 

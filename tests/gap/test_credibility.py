@@ -25,8 +25,10 @@ from coupled.gap.findings.credibility import (
     part_of_a_curve,
     remainder,
 )
-from coupled.gap.findings.regimes import Acts, Regime, _regime, _size
+from coupled.gap.findings.flexible import free_share
+from coupled.gap.findings.regimes import Acts, Regime, _regime, _size, regimes
 from coupled.gap.findings.result import EffectResult, StageResult
+from coupled.gap.findings.where import Remains, signals
 from coupled.gap.search.case import Case
 from coupled.gap.search.problem import Problem
 from coupled.gap.signals.output import Output
@@ -407,3 +409,49 @@ def test_a_size_that_no_halves_know_is_not_shown_to_be_the_same(
     found = Credibility("breakout", (worse, known), 0.9, 9.0, remainder=remains)
     assert (found.value > 0.7) is credible
     assert found.unproven == pytest.approx(remains * math.sqrt(2.0) * error)
+
+
+def test_the_force_of_an_imposed_motion_is_no_condition_on_itself() -> None:
+    """An error of the machine is larger where the measured force is larger, by selection alone."""
+    rng, rate_Hz = np.random.default_rng(3), 50.0
+    times = np.arange(6000) / rate_Hz
+    place = 0.05 * np.sin(0.9 * times) + 0.02 * np.sin(2.3 * times)
+    friction_N = 3.0 * np.sign(np.gradient(place))
+    error_N = np.convolve(rng.normal(0.0, 1.0, len(times)), np.full(6, 0.4), "same")
+    read = Record(
+        ("time_s", "column_force_N", "column_deflection_m"),
+        np.column_stack((times, friction_N + error_N, place)),
+    )
+    output = Output(
+        "loader", "column_force_N", read["column_force_N"], lambda _: friction_N, 0.1, 50
+    )
+    rig = bench()
+    acts = Acts(output, read, friction_N / output.floor, output.residual(rig))
+    known = {one.by: one for one in regimes(Case(rig, "column", [output]), [acts])}
+    assert known["size of force_N"].p_value > 0.01
+    seen = signals(output, acts.left, read, "column")
+    assert free_share(output, acts.left, seen)[0] < 0.1
+    # Where the force is the input, it is as measured.
+    other = replace(output, channel="column_computed_m", _known=[])
+    known = {
+        one.by: one for one in regimes(Case(rig, "column", [other]), [replace(acts, output=other)])
+    }
+    assert known["size of force_N"].p_value < 1e-6
+    assert free_share(other, acts.left, signals(other, acts.left, read, "column"))[0] > 0.5
+
+
+def test_what_no_function_of_the_signals_predicts_is_no_evidence_against_a_law() -> None:
+    """A machine's own error: a nonparametric model beside the effects leaves it as well."""
+    assert remainder(15.0, 5.0, BOUND, 1.0) > 0.8
+    assert remainder(15.0, 5.0, BOUND, 5.0) == 0.0
+    own = np.linspace(1.0, 5.0, 401)
+    known = np.array([remainder(15.0, 5.0, BOUND, one) for one in own])
+    assert np.all(np.diff(known) <= 0.0)
+    assert np.max(-np.diff(known)) < 0.06
+
+    def stage(free_share: float) -> StageResult:
+        remains = Remains(5.0, (), 1.0, free_share, "all")
+        return StageResult("loader", 15.0, 15.0, BOUND, 5.0, guilty=True, remains=remains)
+
+    assert stage(0.0).remainder < 1e-12
+    assert stage(1.0).remainder == replace(stage(1.0), remains=None).remainder > 0.8

@@ -18,6 +18,7 @@ from coupled.record.channels import CONTROL_NAMES
 from coupled.rig.parameters import Control
 from coupled.rig.rig import Rig
 from tests.support.gaps import nominal_rig
+from tests.support.joined import joined
 from tests.support.rigs import bench
 
 ROOT = Path(__file__).parents[2]
@@ -25,7 +26,8 @@ PACKAGE = ROOT / "coupled"
 # Modules of `gap/effects` that hold entries, where an effect's name is spelled.
 ENTRIES = ("library", "loader", "linkage", "sensing", "frictions")
 # Effects of machines of others, which are none of the contract's, and in no blind trial.
-IN_NO_TRIAL = {"servo_delay", "servo_tuning", "servo_acceleration_limit"}
+IN_NO_TRIAL = {"gravity", "servo_delay", "servo_tuning", "servo_acceleration_limit"}
+OF_A_WHEEL, WHEEL = {"gravity"}, CONTROL_NAMES[1]
 TWIN_OF = {kind.name: kind for kind in (*TWINS, *REVISION_2)}
 
 
@@ -54,16 +56,17 @@ def test_what_an_effect_needs_elsewhere_is_there(effect: Effect, flown: Rig) -> 
 
 @pytest.mark.parametrize("effect", EFFECTS, ids=lambda effect: effect.name)
 def test_an_effect_is_entered_under_its_keys_and_nothing_else(effect: Effect, flown: Rig) -> None:
-    starts = {effect.value_key(p): p.starts[0] + p.base(flown, "column") for p in effect.free}
-    changed = apply(flown, "column", [effect], starts)
+    rig, control = (joined(), WHEEL) if effect.name in OF_A_WHEEL else (flown, "column")
+    starts = {effect.value_key(p): p.starts[0] + p.base(rig, control) for p in effect.free}
+    changed = apply(rig, control, [effect], starts)
     for p in effect.parameters:
         value = starts.get(effect.value_key(p), 0.0)
-        assert value_of(changed, "column", p.key) == p.entered(p.nominal(flown, "column"), value)
+        assert value_of(changed, control, p.key) == p.entered(p.nominal(rig, control), value)
     neutral = {effect.value_key(p): float(p.mode == "factor") for p in effect.free}
     if all(p.mode in ("factor", "added") for p in effect.parameters):
-        same = apply(flown, "column", [effect], neutral)
+        same = apply(rig, control, [effect], neutral)
         for p in effect.parameters:
-            assert value_of(same, "column", p.key) == value_of(flown, "column", p.key)
+            assert value_of(same, control, p.key) == value_of(rig, control, p.key)
 
 
 def test_every_stage_and_name_is_listed_once() -> None:

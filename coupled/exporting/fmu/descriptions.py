@@ -26,6 +26,8 @@ PARAMETERS: dict[str, str] = {
     "loader.ripple": "amplitude of a force that is periodic in the deflection",
     "loader.ripple_period": "its period",
     "loader.ripple_phase": "its phase at neutral",
+    "loader.gravity": "weight of a link on a wheel's axis, at a right angle to the vertical",
+    "loader.gravity_angle": "its angle from hanging, at neutral",
     "loader.relaxing_stiffness": "stiffness of a spring that relaxes",
     "loader.relaxing_time": "time in which it relaxes",
     "loader.force_limit": "largest modifying force of the actuator; 0: no limit",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 from coupled.gap.effects.effect import OTHER_FORCE, Effect, Parameter, Signature
@@ -9,6 +10,8 @@ from coupled.gap.effects.entries import SETTING, added, factor, limit, one, swit
 from coupled.gap.effects.frictions import FRICTIONS
 from coupled.gap.effects.seen import ripples, stops
 from coupled.gap.thresholds import CLOCK_s
+
+QUARTERS_rad = tuple(0.5 * math.pi * k for k in range(-1, 3))  # hanging, level, upright
 
 
 def _stop(side: str) -> Parameter:
@@ -88,6 +91,19 @@ LOADER: tuple[Effect, ...] = (
         ),
         Signature("computed", "missing"),
         seen=ripples,
+    ),
+    Effect(
+        "gravity",
+        "loader",
+        (
+            added("gravity_N", "loader.gravity_N", 0, 60, 1.0),
+            replace(
+                value("angle_rad", "loader.gravity_angle_rad", -7, 7, *QUARTERS_rad),
+                scanned=False,
+                shape=True,
+            ),
+        ),
+        Signature("computed", "missing"),
     ),
     Effect(
         "relaxation",

@@ -102,6 +102,8 @@ def _scaled(p: Parameter, scales: Scales, rig: Rig, control: ControlName) -> Par
     if p.mode not in ("added", "value") or p.key.startswith("flight."):
         return p
     unit = p.unit(rig, control)
+    if unit == "rad" and "{d}" not in p.key:  # a phase, which does not grow with the motion
+        return p
     times, size = scales.times_columns(unit, control), scales.size(unit)
     low, high = times * p.low, times * p.high
     if unit == "N" and size is not None and not p.inverse:

@@ -114,17 +114,19 @@ class Credibility:
         return found | {"regimes": [one.as_dict() for one in self.regimes]}
 
 
-def remainder(gap: float, left: float, explained_below: float) -> float:
+def remainder(gap: float, left: float, explained_below: float, own: float = 1.0) -> float:
     """Return the weight of a stage's remaining residual as evidence against its effects, 0 to 1.
 
     `gap` is the gap without effects, `left` that with them, `explained_below` the largest gap of
     an explained stage. The weight grows with the excess of `left` over `explained_below`, and with
     the share of the gap that remains: effects that remove nearly all of a large gap are usually
-    correct.
+    correct. `own` is the machine's own error, the gap that also a nonparametric model beside the
+    effects leaves: no function of the stage's signals, and no evidence against a law.
     """
-    more, known = max(left**2 - 1.0, 0.0), explained_below**2 - 1.0
+    error = max(own, 1.0) ** 2
+    more, known = max(left**2 - error, 0.0), explained_below**2 - 1.0
     surely = more**4 / (more**4 + known**4)
-    share = more / max(gap**2 - 1.0, more, 1e-9)
+    share = more / max(gap**2 - error, more, 1e-9)
     return surely * share / (share + REMAINDER)
 
 
@@ -185,7 +187,7 @@ def _flexible(case: Case, found: Fit, one: Acts) -> tuple[float, float]:
     These are the share of the nonparametric model's residual power that the effect removes, and
     that residual power, without the effect, over the power that the effects leave.
     """
-    known = signals(one.output.stage, one.record, case.control, one.output.frame_rate_Hz)
+    known = signals(one.output, one.left, one.record, case.control)
     answers = response(one.output, found.rig, one.record, case.control)
     leaves = []
     for left in (one.left, one.left + one.action):

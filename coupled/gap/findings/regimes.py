@@ -91,8 +91,8 @@ def regimes(case: Case, acts: Sequence[Acts]) -> tuple[Regime, ...]:
 
 def _dividing(case: Case, one: Acts) -> dict[str, Floats]:
     """Return the signals by which an output's frames are divided into halves."""
-    rate_Hz, found = one.output.frame_rate_Hz, dict[str, Floats]()
-    for name, signal in signals(one.output.stage, one.record, case.control, rate_Hz).items():
+    found = dict[str, Floats]()
+    for name, signal in signals(one.output, one.left, one.record, case.control).items():
         if name.endswith("sign"):
             if "rate" in name:
                 found[name] = signal

@@ -5,6 +5,7 @@ The keys are those of the contract. SI units; a gap is a residual's RMS over its
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -68,7 +69,9 @@ class StageResult:
         """The weight of the remaining residual as evidence against the effects (`credibility`)."""
         if self.left is None or self.settled is None:
             return 0.0
-        return remainder(self.settled, self.left, self.explained_below)
+        predicted = 1.0 if self.remains is None else self.remains.free_share
+        own = self.left * math.sqrt(1.0 - predicted)
+        return remainder(self.settled, self.left, self.explained_below, own)
 
     @property
     def within_settings(self) -> bool:

@@ -140,7 +140,7 @@ class Remains:
 def where(output: Output, rig: Rig, record: Record, control: ControlName) -> Where:
     """Return a description of an output's gap, from its residual with this rig."""
     left, rate_Hz = output.residual(rig), output.frame_rate_Hz
-    known = signals(output.stage, record, control, rate_Hz)
+    known = signals(output, left, record, control)
     drives = {name: x for name, x in known.items() if not name.endswith(("sign", "3", "time_s"))}
     times = in_time(left, drives, rate_Hz)
     pressure = "dynamic_pressure_Pa"
@@ -160,7 +160,7 @@ def where(output: Output, rig: Rig, record: Record, control: ControlName) -> Whe
 def remains(output: Output, improved: Rig, record: Record, control: ControlName) -> Remains:
     """Return a description of an output's residual with the effects found."""
     left, answers = output.residual(improved), response(output, improved, record, control)
-    known = signals(output.stage, record, control, output.frame_rate_Hz)
+    known = signals(output, left, record, control)
     share, signal = free_share(output, left, known, answers)
     return Remains(
         gap=output.gap(improved),
@@ -207,9 +207,15 @@ def response(
     return of_second_order(loader.mass, loader.damping, stiffness, output.frame_rate_Hz)
 
 
-def signals(stage: str, record: Record, control: ControlName, rate_Hz: float) -> dict[str, Floats]:
-    """Return the signals compared with a stage's residual, by name with unit, if recorded."""
-    d = unit_of(control)
+def signals(
+    output: Output, left: Floats, record: Record, control: ControlName
+) -> dict[str, Floats]:
+    """Return the signals compared with an output's residual, by name with unit, if recorded.
+
+    `left` is the residual in floors. If motion is imposed, the force is the output: its prediction
+    replaces the measurement, which contains the residual that is to be explained.
+    """
+    d, rate_Hz = unit_of(control), output.frame_rate_Hz
     names = {
         "loader": (("force", "N"), ("computed", d)),
         "multiplier": (("computed", d), ("gradient", f"N_per_{d}")),
@@ -218,13 +224,14 @@ def signals(stage: str, record: Record, control: ControlName, rate_Hz: float) ->
         "surface": (("estimate", d),),
     }
     found: dict[str, Floats] = {}
-    for quantity, unit in names.get(stage, ()):
+    for quantity, unit in names.get(output.stage, ()):
         name = channel(control, quantity)
         if name not in record and quantity == "computed":
             name = channel(control, "deflection")  # the motion that was imposed
         if name not in record:
             continue
-        smooth = smoothed(record[name])
+        answers = quantity == "force" and name == output.channel
+        smooth = smoothed(record[name] - left * output.floor if answers else record[name])
         found[f"{quantity}_{unit}"] = smooth
         if quantity in ("computed", "estimate"):
             rate = rate_of(smooth, rate_Hz)
@@ -238,10 +245,10 @@ def signals(stage: str, record: Record, control: ControlName, rate_Hz: float) ->
         "surface": ("dynamic_pressure_Pa",),
         "airframe": ("elevator_rad", "pitch_rate_rad_per_s", "alpha_rad"),
     }
-    for name in common.get(stage, ()):
+    for name in common.get(output.stage, ()):
         if name in record:
             found[name] = smoothed(record[name])
-    if stage == "schedule" and "dynamic_pressure_Pa" in found:
+    if output.stage == "schedule" and "dynamic_pressure_Pa" in found:
         found["dynamic_pressure_rate_Pa_per_s"] = rate_of(found["dynamic_pressure_Pa"], rate_Hz)
     found["time_s"] = record.time_s
     return found
@@ -262,7 +269,7 @@ def _follows(
     mean = float(np.mean(left))
     found = [Follows("constant", mean**2 / power, mean * output.floor)]
     spread = left - mean
-    for name, signal in signals(output.stage, record, control, output.frame_rate_Hz).items():
+    for name, signal in signals(output, left, record, control).items():
         moved = signal - signal.mean()
         size = float(moved @ moved)
         if size <= 0.0:

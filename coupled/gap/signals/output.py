@@ -15,6 +15,7 @@ from coupled.gap.signals.steps import coarsely_stepped
 from coupled.gap.thresholds import (
     COARSE_NEAR,
     FAULTY_FROM,
+    FEW_STRETCHES,
     FLOOR_SHARE,
     MISMATCH,
     NOISE_ALONE,
@@ -169,8 +170,7 @@ class Output:
     @property
     def stretches(self) -> NDArray[np.intp]:
         """The number of each frame's stretch."""
-        frames = max(1, round(STRETCH_s * self.frame_rate_Hz))
-        return np.arange(len(self.measured)) // frames
+        return np.arange(len(self.measured)) // stretch_of(len(self.measured), self.frame_rate_Hz)
 
     def rows(self, part: Part) -> NDArray[np.bool_]:
         """Return the frames of a part: every other stretch is fitted, the others are held out."""
@@ -185,7 +185,7 @@ class Output:
         A rare event, such as a limit reached once, would otherwise be in one half only: a stretch
         with much of the residual's power is divided.
         """
-        frames = max(1, round(STRETCH_s * self.frame_rate_Hz))
+        frames = stretch_of(len(self.measured), self.frame_rate_Hz)
         least = max(1, round(SHORTEST_STRETCH_s * self.frame_rate_Hz))
         power = np.concatenate(([0.0], np.cumsum(self.residual(rig) ** 2)))
         most = max(STRETCH_POWER, 2.0 * frames / len(self.measured)) * float(power[-1])
@@ -214,6 +214,12 @@ class Output:
     def gap(self, rig: Rig) -> float:
         """Return the rms residual over the floor."""
         return float(np.sqrt(np.mean(self.residual(rig) ** 2)))
+
+
+def stretch_of(frames: int, rate_Hz: float) -> int:
+    """Return the frames of a stretch of a record; a record of less than two is cut into eight."""
+    whole, least = round(STRETCH_s * rate_Hz), round(SHORTEST_STRETCH_s * rate_Hz)
+    return max(1, whole if frames >= 2 * whole else max(frames // FEW_STRETCHES, least))
 
 
 def white(signal: Floats) -> float:
@@ -260,7 +266,7 @@ def spread(
     alone = own**2 * (1.0 - memory**2) / (1.0 + memory**2 - 2.0 * memory * np.cos(at))
     total = float(np.mean(power + alone))
     square = float(np.mean(power**2 / crowded + 2.0 * power * alone + alone**2))
-    frames = max(1, round(STRETCH_s * rate_Hz))
+    frames = stretch_of(len(carried[0]), rate_Hz)
     starts = np.arange(0, len(carried[0]), frames)
     lengths = np.diff([*starts, len(carried[0])])
     local = np.add.reduceat(np.mean(np.square(carried), axis=0) + own**2, starts) / lengths

@@ -15,17 +15,27 @@ from dataclasses import replace
 from functools import cache, partial
 
 import numpy as np
+from scipy.linalg import eigh
 
 from coupled.gap.effects.effect import Effect, Parameter, dotted
 from coupled.gap.effects.scales import Scales, in_scale
+from coupled.gap.noise.smooth import smoothed
 from coupled.gap.signals.output import Floats, Output, estimate_noise
 from coupled.gap.stages.stages import Reader
-from coupled.gap.thresholds import PLAY_LEAST, PLAYS, PLAYS_ALIKE, REACHED_BEYOND, REACHED_OVER
-from coupled.record.channels import ControlName, channel
+from coupled.gap.thresholds import (
+    MISMATCH,
+    PLAY_LEAST,
+    PLAYS,
+    PLAYS_ALIKE,
+    REACHED_BEYOND,
+    REACHED_OVER,
+)
+from coupled.record.channels import ControlName, channel, unit_of
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
 
 OF_PLAY = "loader.play"  # its key in a rig file without the unit
+GRAVITY = "loader.gravity_N"
 RATE_LIMIT = "loader.servo_rate_limit_{d}_per_s"
 
 
@@ -36,11 +46,37 @@ def tried_effects(
     records, control = [reader.record for reader in readers], readers[0].control
     known = [effect for effect in library if effect.can_be_tried(records, control)]
     known = as_judged(known, readers, outputs)
+    if not _turns_far(readers):
+        known = [one for one in known if all(p.key != GRAVITY for p in one.parameters)]
     known = in_scale(known, Scales.of(readers), readers[0].rig, control)
     if readers[0].set_points:
         known = _under_set_points(known, records, control)
     judged = {output.stage for output in outputs}
     return [effect for effect in known if judged & {*effect.shows_in}]
+
+
+def _turns_far(readers: Sequence[Reader]) -> bool:
+    """Tell whether a motion turns far enough to distinguish gravity from a spring with an offset.
+
+    For every angle of the link, the part of sin(δc + angle) that no straight line in δc represents
+    must exceed the model error of a right effect, as a share of its motion.
+    """
+    if unit_of(readers[0].control) != "rad":
+        return False
+    for reader in readers:
+        names = (reader.name_of(quantity) for quantity in ("computed", "deflection"))
+        name = next((name for name in names if name in reader.record), None)
+        if name is None:
+            continue
+        way = smoothed(reader.record[name])
+        waves = np.column_stack((np.sin(way), np.cos(way)))
+        waves -= waves.mean(axis=0)
+        line = (way - way.mean()) / np.linalg.norm(way - way.mean())
+        curved = waves - np.outer(line, line @ waves)
+        least = eigh(curved.T @ curved, waves.T @ waves, eigvals_only=True)[0]
+        if least > MISMATCH**2:
+            return True
+    return False
 
 
 def as_judged(

@@ -69,7 +69,7 @@ class Clock(Stamped):
     """The clock of the log that makes the frames, the record's frame rate, and the cut."""
 
     rate: float | None = quantity("Hz", None, gt=0, le=1e6)
-    frame_rate: float | None = quantity("Hz", None, ge=1, le=2000)
+    frame_rate: float | None = quantity("Hz", None, ge=1, le=10_000)
     start: float = quantity("s", 0.0, ge=0)
     end: float | None = quantity("s", None, gt=0)
     longest_gap: int = quantity("rows", 2, ge=0, le=1000)
