@@ -22,6 +22,7 @@ from coupled.gap.signals.live import judged_part, live_of
 from coupled.gap.signals.output import Output
 from coupled.gap.signals.reading import worth_recording
 from coupled.gap.stages.airframe import Flights, airframe_outputs
+from coupled.gap.stages.alone import AloneReader, at_rate_of, check_moved_by_pilot, motion_alone
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points
 from coupled.gap.stages.tried import tried_effects
@@ -67,13 +68,19 @@ def prepare(
         rig = baseline.rig
     live = [one for one in map(live_of, records.values()) if one is not None]
     records = {file: judged_part(record, file) for file, record in records.items()}
+    if not rig.controls:
+        records = motion_alone(records)
+        rig = at_rate_of(rig, next(iter(records.values())))
     rig = as_driven(rig, list(records.values()), control) if control in rig.controls else rig
     rig, trim = trimmed(rig, records)
     for file, record in records.items():
         check_record(rig, record, control, file)
         if rig.flight is not None:
             check_trim(trim_speed(rig), record, file)
-    rig = as_counted(rig, list(records.values()), control)
+    if rig.controls:
+        rig = as_counted(rig, list(records.values()), control)
+    else:
+        check_moved_by_pilot(rig)
     judged = Judged(rig, readers_of(rig, records, control), baseline)
     outputs = [
         allowing_for_contact(output.halved(rig), rig, control) for output in judged.under(rig)
@@ -94,8 +101,8 @@ def prepare(
 
 def readers_of(rig: Rig, records: Mapping[str, Record], control: ControlName) -> list[Reader]:
     """Return the reader of each record, which makes its outputs."""
-    each = enumerate(records.values())
-    return [Reader(rig, record, control, surface_points, number) for number, record in each]
+    each, kind = enumerate(records.values()), Reader if rig.controls else AloneReader
+    return [kind(rig, record, control, surface_points, number) for number, record in each]
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from __future__ import annotations
 # Records that are refused (`checks`).
 OTHER_RIG = 2.0  # chosen: factor on the gradient from which a rig file is another rig's
 OTHER_SPEED = 0.03  # chosen: relative error of the trimmed airspeed, from which a trim is another
+OTHER_ALTITUDE_m = 100.0  # chosen: of its altitude, likewise; 1 % of the air's density
 OTHER_PATH_rad = 0.01  # chosen: of its flight path, likewise
 OTHER_RATE = 1e-3  # chosen: relative error of the frame rate, likewise
 STAMP_JITTER = 0.01  # chosen: of a frame, by which a row's time may be off

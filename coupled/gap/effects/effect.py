@@ -246,9 +246,10 @@ def apply(
     for key, length in lengths.items():
         changes[key] = _level(rig, control, changes) / length if length > 0.0 else 0.0
     changes |= _no_less_than_running(rig, control, changes)
-    data = rig.controls[control]
-    changes["compensation.basic_gradient_N_per_{d}"] = data.assumed_basic_gradient
-    changes["compensation.breakout_N"] = data.assumed_breakout
+    if control in rig.controls:
+        data = rig.controls[control]
+        changes["compensation.basic_gradient_N_per_{d}"] = data.assumed_basic_gradient
+        changes["compensation.breakout_N"] = data.assumed_breakout
     d = unit_of(control)
     return rig.changed({dotted(key, control).format(d=d): new for key, new in changes.items()})
 

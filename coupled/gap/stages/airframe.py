@@ -26,11 +26,11 @@ from coupled.gap.noise.smooth import smoothed
 from coupled.gap.signals.air import Air, vertical_air
 from coupled.gap.signals.floors import left_noise
 from coupled.gap.signals.output import Output, estimate_noise, spread, white
-from coupled.gap.stages.openloop import Flown, Moved, flown_in, fly_open_loop
-from coupled.gap.stages.surfaces import moved, surface_channel, surface_points
+from coupled.gap.stages.openloop import Between, Flown, Moved, flown_in, fly_open_loop
+from coupled.gap.stages.surfaces import flown_by, moved, surface_channel, surface_points
 from coupled.gap.stages.trim import Trim, trim_of
 from coupled.gap.thresholds import FLIGHT_KNOWN, UNTRIMMED
-from coupled.record.channels import ControlName, channel, motion_channels
+from coupled.record.channels import LATERAL, ControlName, channel, motion_channels
 from coupled.record.record import Record
 from coupled.rig.parameters import Flight
 from coupled.rig.recorder import stamped
@@ -91,6 +91,14 @@ class Model:
         asked = (flight, self.compared, _digest(self.moved), late)
         return self.flights.of(asked, lambda: self.fly(flight, self.moved, late=late))
 
+    def unknown_between(self, plain: Floats) -> Floats:
+        """Return the change of the flight by another interpolation between the rows."""
+        assert self.rig.flight is not None
+        if self.rig.controls or self.rig.flight.steps_per_frame == 1:
+            return np.zeros_like(plain)
+        flight = changed(self.rig.flight, {"motion_stamp_s": 0.0}, self.rig.name, "flight")
+        return self.fly(flight, self.moved, between="spline").motion - plain
+
     def carried(self, wrong: Sequence[Moved], plain: Flown) -> Floats:
         """Return the change of the flight by errors of the surfaces' motion and of the air."""
         assert self.rig.flight is not None
@@ -101,9 +109,14 @@ class Model:
         return flown.motion - plain.motion
 
     def fly(
-        self, flight: Flight, moved: Sequence[Moved], with_error: bool = False, late: float = 0.0
+        self,
+        flight: Flight,
+        moved: Sequence[Moved],
+        with_error: bool = False,
+        late: float = 0.0,
+        between: Between = "pchip",
     ) -> Flown:
-        """Return the flight with the given surface motion.
+        """Return the flight with the given surface motion, interpolated between the rows.
 
         `with_error` adds a sample of its error to the air, whose estimate is `late` frames late.
         """
@@ -112,9 +125,10 @@ class Model:
             moves = self.air.speed * (flight.gust_rms / self.air.rms)
             moves = stamped(moves + self.air.error if with_error else moves, -late)
             air = (*moves[1:].tolist(), 0.0)  # row k + 1 holds the air over the frame before
-        controls, rate_Hz = list(self.rig.controls), self.rig.frame_rate
+        controls, rate_Hz = flown_by(self.rig), self.rig.frame_rate
         given = (flight, rate_Hz, controls, moved, self.compared, air)
-        return fly_open_loop(*given, *flown_in(self.record, controls, rate_Hz))
+        known = flown_in(self.record, controls, rate_Hz)
+        return fly_open_loop(*given, *known, between_rows="held" if self.rig.controls else between)
 
 
 def _digest(moved: Sequence[Moved]) -> bytes:
@@ -132,7 +146,7 @@ def needs(rig: Rig, record: Record) -> tuple[str, ...]:
 
     They include the command of a control that was moved and has no surface position.
     """
-    own = (surface_channel("column"),) if "column" in rig.controls else ()
+    own = (surface_channel("column"),) if "column" in flown_by(rig) else ()
     found: tuple[str, ...] = (RATE, *own)
     for control in rig.controls:
         by_position = surface_channel(control) in record and surface_points(rig, control)
@@ -155,11 +169,11 @@ def airframe_outputs(
     """
     if rig.flight is None or any(name not in record for name in needs(rig, record)):
         return []
-    known = motion_channels(list(rig.controls), flown=True)
-    by_laws = [surface_channel(c) for c in rig.controls if surface_points(rig, c) is None]
+    known = _known_motion(rig, record)
+    by_laws = [surface_channel(c) for c in flown_by(rig) if surface_points(rig, c) is None]
     wanted = [name for name in (*COMPARED, *by_laws) if name in known and name in record]
     compared = tuple(name for name in wanted if np.ptp(record[name]) > 0.0)
-    each = {control: trim_of(rig, record, control) for control in rig.controls}
+    each = {control: trim_of(rig, record, control) for control in flown_by(rig)}
     trims = {control: trim for control, trim in each.items() if trim is not None}
     places = {control: (trim.position, trim.jump) for control, trim in trims.items()}
     right, wrong = moved(rig, record, places, np.random.default_rng(43))
@@ -168,13 +182,14 @@ def airframe_outputs(
     flown = model.flown(rig)
     assert flown is not None  # the filed rig can be trimmed
     carried = model.carried(wrong, flown)
+    unknown = model.unknown_between(flown.motion)
     outputs = []
     for i, name in enumerate(compared):
         noise = left_noise(
             estimate_noise(record[name]), record[name], record[name] - flown.motion[:, i]
         )
         own = float(np.hypot(noise.rms, FLIGHT_KNOWN * np.ptp(record[name])))
-        moved_by = float(np.sqrt(np.mean(carried[:, i] ** 2)))
+        moved_by = float(np.sqrt(np.mean(carried[:, i] ** 2 + unknown[:, i] ** 2)))
         floor = float(np.hypot(own, moved_by))
         loose = spread([carried[:, i]], own, noise.memory, rig.frame_rate)
 
@@ -193,12 +208,25 @@ def airframe_outputs(
     return outputs
 
 
+def _known_motion(rig: Rig, record: Record) -> tuple[str, ...]:
+    """Return the motion's channels that the surfaces of a record determine.
+
+    An aircraft alone is flown by all its surfaces: without the positions of aileron and rudder in
+    the record, its lateral motion is not known.
+    """
+    known = motion_channels(flown_by(rig), flown=True)
+    beside = (surface_channel("wheel"), surface_channel("pedals"))
+    if rig.controls or all(name in record for name in beside):
+        return known
+    return tuple(name for name in known if name not in LATERAL)
+
+
 def _trim_output(model: Model, record: Record, trim: Trim, number: int) -> Output:
     """Return the elevator position in trim as an output, with the noise of its channel.
 
     The trim is measured over a part of the rows, so the noise floor is higher than the noise.
     """
-    position, at = record[surface_channel("column")], list(model.rig.controls).index("column")
+    position, at = record[surface_channel("column")], flown_by(model.rig).index("column")
     noise = position - smoothed(position)
     noise *= white(position) / max(float(np.std(noise)), 1e-12)
     floor = max(trim.error * math.sqrt(len(position)), 1e-9)

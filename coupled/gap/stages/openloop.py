@@ -10,9 +10,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from threading import Lock
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline, PchipInterpolator
 
 from coupled.flight.aircraft import make_aircraft
 from coupled.flight.airframe import JSBSimAirframe
@@ -30,6 +32,7 @@ from coupled.schema import changed
 
 Floats = NDArray[np.float64]
 Points = tuple[Floats, Floats]
+Between = Literal["held", "pchip", "spline"]
 _flying = Lock()  # JSBSim holds the GIL, so two flights at once would only alternate
 
 
@@ -97,16 +100,24 @@ def fly_open_loop(
     air_m_per_s: Sequence[float] | None = None,
     conditions: Sequence[Wrapper] = (),
     trims: Floats | None = None,
+    *,
+    between_rows: Between = "held",
 ) -> Flown:
     """Return the flight of a model from its trim, driven by its surfaces; a row for each frame.
 
     `air_m_per_s` is the vertical speed of the air over each frame. The `conditions` act on the
     model as on the aircraft. `trims` are the commands by which they move the trim, shape (frames,
-    controls), which the surface positions include. Raises InputError if the model cannot be
-    trimmed.
+    controls), which the surface positions include. `between_rows` is how the commands change over
+    a frame of several steps: `held`, as those of a host, or interpolated. Raises InputError if the
+    model cannot be trimmed.
     """
     still = changed(flight, STILL, "rig", "flight")
-    frame_s = 1.0 / frame_rate_Hz
+    frame_s, steps = 1.0 / frame_rate_Hz, 1
+    if between_rows != "held" and flight.steps_per_frame > 1:
+        steps = flight.steps_per_frame
+        still = changed(still, {"steps_per_frame": 1}, "rig", "flight")
+        frame_s /= steps
+        air_m_per_s = None if air_m_per_s is None else np.repeat(air_m_per_s, steps).tolist()
     gusts = Gusts(still, frame_s, air_m_per_s=air_m_per_s)
     with _flying:
         models = [aircraft_folder()]
@@ -121,11 +132,20 @@ def fly_open_loop(
             if trims is not None and one.points is not None:
                 asked[1:-1, i] -= trims[:-1, i]  # a row results from the frame before it
         asked[-1] = asked[-2]
-        return Flown(_motion(airframe, asked[1:], channels), trim)
+        asked = asked[1:] if steps == 1 else _between(asked, steps, between_rows)
+        return Flown(_motion(airframe, asked, channels)[::steps], trim)
+
+
+def _between(asked: Floats, steps: int, how: Between) -> Floats:
+    """Return the commands at each step after the first row, shape ((rows − 1)·steps, controls)."""
+    rows = np.arange(len(asked))
+    at = (1.0 + np.arange((len(asked) - 1) * steps)) / steps
+    law = PchipInterpolator if how == "pchip" else CubicSpline
+    return np.asarray(law(rows, asked, axis=0)(at))
 
 
 def _motion(airframe: JSBSimAirframe, asked: Floats, channels: Sequence[str]) -> Floats:
-    """Return the channels, shape (frames, channels), of a flight with commands about trim.
+    """Return the channels, shape (steps, channels), of a flight with commands about trim.
 
     A row results from the commands of the row before.
     """
