@@ -23,6 +23,7 @@ from coupled.gap.signals.output import Output
 from coupled.gap.signals.reading import worth_recording
 from coupled.gap.stages.airframe import Flights, airframe_outputs
 from coupled.gap.stages.alone import AloneReader, at_rate_of, check_moved_by_pilot, motion_alone
+from coupled.gap.stages.shots import not_judged
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points
 from coupled.gap.stages.tried import tried_effects
@@ -39,8 +40,8 @@ class Prepared:
     """Prepared records of one control of a rig.
 
     `case` holds the rig and the outputs, `library` the effects that can be tried. `trim` and
-    `left_out` are sentences for the report: the trim that was taken from the records, and the parts
-    of live records that are not judged. `baseline` is the healthy machine, if it is known.
+    `left_out` are sentences for the report: the trim that was taken from the records, and what of
+    the records is not judged. `baseline` is the healthy machine, if it is known.
     """
 
     case: Case
@@ -87,6 +88,9 @@ def prepare(
     ]
     if not outputs:
         raise InputError(next(iter(records)), "", _too_little(rig, control, judged.readers))
+    left_out = [words for one in live for words in one.left_out]
+    if any(output.stage == "airframe" for output in outputs):
+        left_out += [words for words in [not_judged(list(records.values()))] if words]
     library = tried_effects(library_of(rig, control), judged.readers, outputs)
     return Prepared(
         Case(rig, control, outputs, tell, judged.under, model_error_in_floors=baseline is not None),
@@ -94,7 +98,7 @@ def prepare(
         tuple(judged.readers),
         records,
         trim,
-        tuple(dict.fromkeys(words for one in live for words in one.left_out)),
+        tuple(dict.fromkeys(left_out)),
         baseline,
     )
 

@@ -35,8 +35,10 @@ PROPERTIES = (
     "velocities/vt-fps",
     "position/h-sl-ft",
 )
-OF_THE_GUIDE = ("fcs/elevator-pos-rad", "velocities/q-rad_sec", "aero/alpha-rad")
-OF_THE_GUIDE += ("accelerations/Nz", "velocities/vt-fps", "position/h-sl-ft")
+OF_THE_GUIDE = (
+    *("fcs/elevator-pos-rad", "velocities/q-rad_sec", "aero/alpha-rad"),
+    *("accelerations/Nz", "velocities/vt-fps", "position/h-sl-ft"),
+)
 # FlightGear's names of some of them, with the factor from JSBSim's unit.
 _DEG = 180.0 / np.pi
 FLIGHTGEAR = {

@@ -52,7 +52,7 @@ class Diagnosis(Findings, TableResult):
     change: Comparison | None = field(default=None, repr=False, compare=False)
     # Channels whose logs were filtered, and the source of their noise floors.
     filtered: Mapping[str, str] = field(default_factory=dict)
-    # What of live records is not judged, or judged with changes; a sentence each.
+    # What of the records is not judged, or judged with changes; a sentence each.
     left_out: tuple[str, ...] = ()
     # Parameters of the effects found that the records determine only together.
     inseparable: tuple[Alike, ...] = ()

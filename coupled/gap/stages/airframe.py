@@ -2,9 +2,9 @@
 
 The measured surface deflections from trim are added to the model's own trim, and the model is
 flown open loop (`openloop`). Rates, angle of attack, sideslip and load factor are compared, since
-errors in them decay within seconds. Attitude, speed and height are not, since they integrate every
-small error. The elevator position in trim is compared too (`trim`). `air` estimates the motion of
-the air.
+errors in them decay within seconds. Speed and pitch attitude integrate every small error, and are
+compared in short segments (`shots`). The elevator position in trim is compared too (`trim`). `air`
+estimates the motion of the air.
 
 If the aircraft's control laws move a surface, the host's command is the input: it is flown through
 JSBSim's laws, and the surface is an output.
@@ -27,9 +27,10 @@ from coupled.gap.signals.air import Air, vertical_air
 from coupled.gap.signals.floors import left_noise
 from coupled.gap.signals.output import Output, estimate_noise, spread, white
 from coupled.gap.stages.openloop import Between, Flown, Moved, flown_in, fly_open_loop
+from coupled.gap.stages.shots import SLOW, Restarts, States
 from coupled.gap.stages.surfaces import flown_by, moved, surface_channel, surface_points
 from coupled.gap.stages.trim import Trim, trim_of
-from coupled.gap.thresholds import FLIGHT_KNOWN, UNTRIMMED
+from coupled.gap.thresholds import FLIGHT_KNOWN, SHOT_KNOWN, SHOT_TRIES, UNTRIMMED
 from coupled.record.channels import LATERAL, ControlName, channel, motion_channels
 from coupled.record.record import Record
 from coupled.rig.parameters import Flight
@@ -48,7 +49,7 @@ COMPARED = (
     "sideslip_rad",
 )
 TRIM = "elevator_trim_rad"  # elevator position in trim
-_KEPT = 12  # size of the cache of flights
+_KEPT = 24  # size of the cache of flights
 
 
 class Flights:
@@ -81,6 +82,7 @@ class Model:
     compared: tuple[str, ...]
     air: Air | None
     flights: Flights = field(default_factory=Flights)
+    restarts: Restarts | None = None
 
     def flown(self, rig: Rig) -> Flown | None:
         """Return the compared channels and the trim of `rig`; None if it cannot be trimmed."""
@@ -99,6 +101,25 @@ class Model:
         flight = changed(self.rig.flight, {"motion_stamp_s": 0.0}, self.rig.name, "flight")
         return self.fly(flight, self.moved, between="spline").motion - plain
 
+    def shots(self, rig: Rig) -> Floats | None:
+        """Return speed and pitch attitude with restarts; None if `rig` cannot be trimmed."""
+        assert rig.flight is not None and self.restarts is not None
+        flight = changed(rig.flight, {"motion_stamp_s": 0.0}, self.rig.name, "flight")
+        late, states = rig.flight.motion_stamp * self.rig.frame_rate, self.restarts
+        asked = (flight, SLOW, _digest(self.moved), late)
+        flown = self.flights.of(
+            asked, lambda: self.fly(flight, self.moved, late=late, restarts=states.at(late))
+        )
+        return None if flown is None else flown.motion[:, 1:]
+
+    def wrong_shots(self, wrong: Sequence[Moved], plain: Floats) -> list[Floats]:
+        """Return the changes of speed and attitude by errors of surfaces, air and restarts."""
+        assert self.rig.flight is not None and self.restarts is not None
+        flight = changed(self.rig.flight, {"motion_stamp_s": 0.0}, self.rig.name, "flight")
+        each = [self.restarts.wrong(sample) for sample in range(SHOT_TRIES)]
+        flown = [self.fly(flight, wrong, with_error=True, restarts=states) for states in each]
+        return [one.motion[:, 1:] - plain for one in flown]
+
     def carried(self, wrong: Sequence[Moved], plain: Flown) -> Floats:
         """Return the change of the flight by errors of the surfaces' motion and of the air."""
         assert self.rig.flight is not None
@@ -115,6 +136,7 @@ class Model:
         with_error: bool = False,
         late: float = 0.0,
         between: Between = "pchip",
+        restarts: States | None = None,
     ) -> Flown:
         """Return the flight with the given surface motion, interpolated between the rows.
 
@@ -126,9 +148,11 @@ class Model:
             moves = stamped(moves + self.air.error if with_error else moves, -late)
             air = (*moves[1:].tolist(), 0.0)  # row k + 1 holds the air over the frame before
         controls, rate_Hz = flown_by(self.rig), self.rig.frame_rate
-        given = (flight, rate_Hz, controls, moved, self.compared, air)
+        channels = self.compared if restarts is None else (RATE, *SLOW)
+        given = (flight, rate_Hz, controls, moved, channels, air)
         known = flown_in(self.record, controls, rate_Hz)
-        return fly_open_loop(*given, *known, between_rows="held" if self.rig.controls else between)
+        between = "held" if self.rig.controls else between
+        return fly_open_loop(*given, known, between_rows=between, restarts=restarts)
 
 
 def _digest(moved: Sequence[Moved]) -> bytes:
@@ -169,16 +193,18 @@ def airframe_outputs(
     """
     if rig.flight is None or any(name not in record for name in needs(rig, record)):
         return []
-    known = _known_motion(rig, record)
+    judged = _known_motion(rig, record)
     by_laws = [surface_channel(c) for c in flown_by(rig) if surface_points(rig, c) is None]
-    wanted = [name for name in (*COMPARED, *by_laws) if name in known and name in record]
+    wanted = [name for name in (*COMPARED, *by_laws) if name in judged and name in record]
     compared = tuple(name for name in wanted if np.ptp(record[name]) > 0.0)
     each = {control: trim_of(rig, record, control) for control in flown_by(rig)}
     trims = {control: trim for control, trim in each.items() if trim is not None}
     places = {control: (trim.position, trim.jump) for control, trim in trims.items()}
     right, wrong = moved(rig, record, places, np.random.default_rng(43))
     air = vertical_air(record, 1.0 / rig.frame_rate)
-    model = Model(rig, record, right, compared, air, Flights() if flights is None else flights)
+    known = Flights() if flights is None else flights
+    restarts = Restarts.of(record, rig.frame_rate)
+    model = Model(rig, record, right, compared, air, known, restarts)
     flown = model.flown(rig)
     assert flown is not None  # the filed rig can be trimmed
     carried = model.carried(wrong, flown)
@@ -203,8 +229,37 @@ def airframe_outputs(
 
         given = (record[name], predict, floor, rig.frame_rate, number, loose, moved_by / floor)
         outputs.append(Output("airframe", name, *given))
+    if restarts is not None:
+        outputs += _slow_outputs(model, wrong, number)
     if "column" in trims:
         outputs.append(_trim_output(model, record, trims["column"], number))
+    return outputs
+
+
+def _slow_outputs(model: Model, wrong: Sequence[Moved], number: int) -> list[Output]:
+    """Return speed and pitch attitude, predicted in segments restarted as measured."""
+    record, rate_Hz = model.record, model.rig.frame_rate
+    shots = model.shots(model.rig)
+    assert shots is not None  # the filed rig can be trimmed
+    carried = model.wrong_shots(wrong, shots)
+    outputs = []
+    for i, name in enumerate(SLOW):
+        noise = left_noise(estimate_noise(record[name]), record[name], record[name] - shots[:, i])
+        own = float(np.hypot(noise.rms, SHOT_KNOWN * np.ptp(record[name])))
+        errors = [one[:, i] for one in carried]
+        moved_by = float(np.sqrt(np.mean(np.square(errors))))
+        floor = float(np.hypot(own, moved_by))
+        loose = spread(errors, own, noise.memory, rate_Hz)
+
+        def predict(other: Rig, i: int = i, name: str = name, floor: float = floor) -> Floats:
+            assert other.flight is not None
+            made = model.shots(other)
+            if made is None:
+                return record[name] + UNTRIMMED * floor
+            return stamped(np.asarray(made[:, i]), other.flight.motion_stamp * rate_Hz)
+
+        given = (record[name], predict, floor, rate_Hz, number, loose, moved_by / floor)
+        outputs.append(Output("airframe", name, *given))
     return outputs
 
 

@@ -152,7 +152,7 @@ def _followed(
     for trim, jump in ((own, there - own), (there, 0.0)):
         surfaces, _ = moved(rig, short, {control: (trim, jump)}, np.random.default_rng(43))
         given = (rig.flight, rig.frame_rate, flown_by(rig), surfaces, names, None)
-        flown = fly_open_loop(*given, *flown_in(short, flown_by(rig), rig.frame_rate))
+        flown = fly_open_loop(*given, flown_in(short, flown_by(rig), rig.frame_rate))
         left = np.column_stack([short[n] - flown.motion[:, i] for i, n in enumerate(names)])
         linear = _lagged(smoothed(short[surface_channel(control)]), rig.frame_rate)
         left -= linear @ np.linalg.lstsq(linear, left, rcond=None)[0]
