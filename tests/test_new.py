@@ -67,7 +67,8 @@ def test_a_rig_that_no_run_suits_is_refused_and_nothing_written(tmp_path: Path) 
 
 def test_a_rig_may_be_an_aircraft_alone(tmp_path: Path) -> None:
     made = coupled(tmp_path, "new", "rig", "T37", "air.toml", "--airframe-only")
-    assert made.stdout.splitlines() == ["written: air.toml", "next: coupled terms T37"]
+    then = "next: coupled diagnose RECORD --rig air.toml"
+    assert made.stdout.splitlines() == ["written: air.toml", then]
     rig = load_rig(tmp_path / "air.toml")
     assert (rig.controls, rig.flight and rig.flight.model) == ({}, "T37")
     assert new_rig("T37", "air", airframe_only=True).to_toml() == rig.to_toml()

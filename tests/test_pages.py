@@ -57,7 +57,7 @@ def trimmed(text: str) -> str:
 
 def prepare(folder: Path) -> None:
     """Give a folder the files that the pages' commands name."""
-    for name in ("typo.toml", "floor.csv", "yoke-readings.csv"):
+    for name in ("typo.toml", "floor.csv", "yoke-readings.csv", "JSBout.csv"):
         (folder / name).write_bytes((ROOT / "tests" / "data" / name).read_bytes())
 
 

@@ -219,8 +219,10 @@ def _write_improved(
     for setting in (one for one in whole.settings if one.moved):
         remark += f"changed: {setting.words}, within its tolerance\n"
     remark += "".join(f"{sentence}\n" for sentence in outdated_bends(filed, whole.improved))
-    # The trim was taken from the record, and is no change of the rig file.
-    changes = differences(trimmed(filed, records)[0], whole.improved)
+    # The trim was taken from the record, and is no change of the rig file; nor is the frame rate
+    # of a rig without controls.
+    judged = trimmed(filed, records)[0] if filed.controls else whole.nominal
+    changes = differences(judged, whole.improved)
     said = remark
     for key in changes:
         dotted = ".".join(key)

@@ -269,5 +269,5 @@ def _for_model(model: str, file: Path | None, airframe_only: bool) -> None:
     folder = path_from(path.parent, chosen.home) if chosen.own else ""
     text = draft(found, path.stem, folder, airframe_only)
     then = f"coupled new run --rig {path}, and coupled compare"
-    then = f"coupled terms {model}" if airframe_only else then
+    then = f"coupled diagnose RECORD --rig {path}" if airframe_only else then
     write_new(path, text, ".toml", then)

@@ -57,6 +57,19 @@ from coupled.units import DEGREE_rad, FOOT_m, KNOT_m_per_s
 _COMMANDS = {name: f"fcs/{name}-cmd-norm" for name in SURFACES.values()}
 _POSITIONS = {PROPERTIES[f"{surface}_rad"]: control for control, surface in SURFACES.items()}
 UNTRIMMED = "calibrated_airspeed_m_per_s"  # key of the fault of an aircraft that does not trim
+# The motion's channels that define its state: the flow, and JSBSim's initial conditions of others.
+SPEED = "true_airspeed_m_per_s"
+_FLOW = (SPEED, "alpha_rad", "sideslip_rad")
+_MOVED_TO = {
+    "altitude_m": "ic/h-sl-ft",
+    "roll_rad": "ic/phi-rad",
+    "pitch_rad": "ic/theta-rad",
+    "heading_rad": "ic/psi-true-rad",
+    "roll_rate_rad_per_s": "ic/p-rad_sec",
+    "pitch_rate_rad_per_s": "ic/q-rad_sec",
+    "yaw_rate_rad_per_s": "ic/r-rad_sec",
+}
+_WIND = tuple(f"atmosphere/wind-{way}-fps" for way in ("north", "east", "down"))
 _HEIGHT, _WHEELS = "position/h-agl-ft", "gear/wow"
 _STRUCTURE = re.compile(r"contact/unit(\[\d+\])?/WOW").fullmatch  # contacts other than wheels
 
@@ -357,6 +370,39 @@ class JSBSimAirframe:
         """Reset and trim the aircraft; only one without acting wrappers (`kept`)."""
         put_back(self._fdm)
         self._trim(())
+
+    def put(self, state: Mapping[str, float]) -> None:
+        """Put the aircraft into a state of motion, by channel, SI; other channels stay.
+
+        Engines, control laws, surfaces and the air stay as they are.
+        """
+        fdm = self._fdm
+        now = {name: fdm[PROPERTIES[name]] for name in (*_FLOW, *_MOVED_TO)}
+        now |= state
+        if SPEED in state:
+            now[SPEED] /= FOOT_m
+        if "altitude_m" in state:
+            now["altitude_m"] /= FOOT_m
+        speed, alpha, beta = (now[name] for name in _FLOW)
+        flow = (math.cos(alpha) * math.cos(beta), math.sin(beta), math.sin(alpha) * math.cos(beta))
+        body = {
+            f"ic/{axis}-fps": speed * share
+            + fdm[f"velocities/{axis}-fps"]
+            - fdm[f"velocities/{axis}-aero-fps"]
+            for axis, share in zip("uvw", flow, strict=True)
+        }
+        wind = {name: fdm[name] for name in _WIND}
+        for name, initial in _MOVED_TO.items():
+            fdm[initial] = now[name]
+        for name, value in body.items():  # after the attitude, which turns them
+            fdm[name] = value
+        fdm.run_ic()  # in still air
+        if any(wind.values()):
+            for name, value in wind.items():
+                fdm[name] = value
+            fdm.suspend_integration()
+            fdm.run()
+            fdm.resume_integration()
 
     def surface_map(self, surface: str = "elevator_rad") -> tuple[Floats, Floats]:
         """Return commands about trim, and a surface's position for each, rad.

@@ -18,7 +18,6 @@ from dataclasses import replace
 from coupled.gap.findings.answer import effects_of, incredible, settings_of, verdict_of
 from coupled.gap.findings.budget import stage_budget
 from coupled.gap.findings.diagnosis import Diagnosis
-from coupled.gap.findings.equivalents import with_equivalents
 from coupled.gap.findings.healthy import Baseline, beside_healthy
 from coupled.gap.findings.inseparable import inseparable
 from coupled.gap.findings.judge import Judge
@@ -64,7 +63,6 @@ def diagnose(
 
 def findings(prepared: Prepared, case: Case, choice: Choice) -> Diagnosis:
     """Return the diagnosis from a search; `case` has the final noise floors."""
-    choice = with_equivalents(choice, case, prepared.library)
     rig, control, readers = case.nominal, case.control, prepared.readers
     outputs = list(case.outputs)
     judge = Judge(readers, outputs, choice, case.gaps(choice.fit.rig))

@@ -22,6 +22,8 @@ from coupled.gap.signals.live import judged_part, live_of
 from coupled.gap.signals.output import Output
 from coupled.gap.signals.reading import worth_recording
 from coupled.gap.stages.airframe import Flights, airframe_outputs
+from coupled.gap.stages.alone import AloneReader, at_rate_of, check_moved_by_pilot, motion_alone
+from coupled.gap.stages.shots import not_judged
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points
 from coupled.gap.stages.tried import tried_effects
@@ -38,8 +40,8 @@ class Prepared:
     """Prepared records of one control of a rig.
 
     `case` holds the rig and the outputs, `library` the effects that can be tried. `trim` and
-    `left_out` are sentences for the report: the trim that was taken from the records, and the parts
-    of live records that are not judged. `baseline` is the healthy machine, if it is known.
+    `left_out` are sentences for the report: the trim that was taken from the records, and what of
+    the records is not judged. `baseline` is the healthy machine, if it is known.
     """
 
     case: Case
@@ -67,19 +69,28 @@ def prepare(
         rig = baseline.rig
     live = [one for one in map(live_of, records.values()) if one is not None]
     records = {file: judged_part(record, file) for file, record in records.items()}
+    if not rig.controls:
+        records = motion_alone(records)
+        rig = at_rate_of(rig, next(iter(records.values())))
     rig = as_driven(rig, list(records.values()), control) if control in rig.controls else rig
     rig, trim = trimmed(rig, records)
     for file, record in records.items():
         check_record(rig, record, control, file)
         if rig.flight is not None:
             check_trim(trim_speed(rig), record, file)
-    rig = as_counted(rig, list(records.values()), control)
+    if rig.controls:
+        rig = as_counted(rig, list(records.values()), control)
+    else:
+        check_moved_by_pilot(rig)
     judged = Judged(rig, readers_of(rig, records, control), baseline)
     outputs = [
         allowing_for_contact(output.halved(rig), rig, control) for output in judged.under(rig)
     ]
     if not outputs:
         raise InputError(next(iter(records)), "", _too_little(rig, control, judged.readers))
+    left_out = [words for one in live for words in one.left_out]
+    if any(output.stage == "airframe" for output in outputs):
+        left_out += [words for words in [not_judged(list(records.values()))] if words]
     library = tried_effects(library_of(rig, control), judged.readers, outputs)
     return Prepared(
         Case(rig, control, outputs, tell, judged.under, model_error_in_floors=baseline is not None),
@@ -87,15 +98,15 @@ def prepare(
         tuple(judged.readers),
         records,
         trim,
-        tuple(dict.fromkeys(words for one in live for words in one.left_out)),
+        tuple(dict.fromkeys(left_out)),
         baseline,
     )
 
 
 def readers_of(rig: Rig, records: Mapping[str, Record], control: ControlName) -> list[Reader]:
     """Return the reader of each record, which makes its outputs."""
-    each = enumerate(records.values())
-    return [Reader(rig, record, control, surface_points, number) for number, record in each]
+    each, kind = enumerate(records.values()), Reader if rig.controls else AloneReader
+    return [kind(rig, record, control, surface_points, number) for number, record in each]
 
 
 @dataclass(frozen=True)

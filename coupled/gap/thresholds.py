@@ -9,6 +9,7 @@ from __future__ import annotations
 # Records that are refused (`checks`).
 OTHER_RIG = 2.0  # chosen: factor on the gradient from which a rig file is another rig's
 OTHER_SPEED = 0.03  # chosen: relative error of the trimmed airspeed, from which a trim is another
+OTHER_ALTITUDE_m = 100.0  # chosen: of its altitude, likewise; 1 % of the air's density
 OTHER_PATH_rad = 0.01  # chosen: of its flight path, likewise
 OTHER_RATE = 1e-3  # chosen: relative error of the frame rate, likewise
 STAMP_JITTER = 0.01  # chosen: of a frame, by which a row's time may be off
@@ -105,6 +106,9 @@ PRELOAD_UNSURE = 8.0  # chosen: of a channel's noise: about neutral the preload'
 REPLAY_KNOWN = 1e-5
 SURFACE_KNOWN = 1e-4  # chosen: error of a surface position from the commands, of its span
 FLIGHT_KNOWN = 1e-4  # chosen: error of a motion replayed from measured surfaces, of its span
+SHOT_KNOWN = 5e-4  # measured: the same with restarts, whose first step is of lower order
+SHOT_TRIES = 3  # chosen: samples of the error of restarts, of which each segment has one
+SHOT_s = 5.0  # chosen: between restarts; longer than the short period, far below the phugoid's
 SLOW_LOADER_s = 5.0  # period above which a replay is restarted, as for an axis without spring
 RESTART_s = 0.25  # chosen: between the restarts of a loader that drifts, and of short replays
 RATCHET = 1.0 / (2.0**0.5 - 1.0)  # noise of √2 times the size causes √2 times the creep
@@ -206,9 +210,9 @@ RIPPLE_LEAST = 1.5  # chosen: least periods within the deflections; fewer are pa
 RIPPLE_PERIODS, RIPPLES_TRIED = 60.0, 4  # chosen: most periods, and number of ripples tried
 
 # Alternatives, and the model error (`beam`, `problem`).
-# Difference of log-likelihood "not worth more than a bare mention" (Kass and Raftery, J. Am.
-# Statist. Assoc. 90, 1995): effects within it are equivalent.
-SAME_LIKELIHOOD = 1.0
+# Difference of log evidence of 2 ln B > 10, "very strong": Kass and Raftery, J. Am. Statist.
+# Assoc. 90, 1995.
+VERY_STRONG = 5.0
 RIVAL_GAIN = 4.0  # chosen: least log evidence of the best set over a set that is no alternative
 MISMATCH = 0.03  # chosen: model error of a right effect, share of the gap
 

@@ -15,7 +15,7 @@ from coupled.errors import InputError
 from coupled.flight.aircraft import make_aircraft
 from coupled.flight.altered import STILL
 from coupled.gap.checks import SPEED, start_of
-from coupled.gap.thresholds import OTHER_SPEED, OTHER_PATH_rad
+from coupled.gap.thresholds import OTHER_SPEED, OTHER_ALTITUDE_m, OTHER_PATH_rad
 from coupled.record.channels import motion_channels
 from coupled.record.record import Record
 from coupled.resources import aircraft_folder
@@ -33,6 +33,7 @@ TRIM_KEYS = (
     "landing",
     "properties",
 )
+ALTITUDE = "altitude_m"
 _FIELDS = file_keys(Flight, "m")
 
 
@@ -121,10 +122,12 @@ def _measured_trim(rig: Rig, record: Record, file: str) -> dict[str, Any]:
         return {}
     flight, found = rig.flight, dict[str, Any]()
     wanted = start_of(record, SPEED)
-    if abs(wanted / trim_speed(rig) - 1.0) <= OTHER_SPEED:
+    altitude = start_of(record, ALTITUDE) if ALTITUDE in record else flight.altitude
+    elsewhere = abs(altitude - flight.altitude) > OTHER_ALTITUDE_m
+    if abs(wanted / trim_speed(rig) - 1.0) <= OTHER_SPEED and not elsewhere:
         return {}
-    if "altitude_m" in record:
-        found["altitude_m"] = start_of(record, "altitude_m")
+    if ALTITUDE in record:
+        found["altitude_m"] = altitude
     if "pitch_rad" in record and "alpha_rad" in record:
         path = start_of(record, "pitch_rad") - start_of(record, "alpha_rad")
         if abs(path - flight.flight_path) > OTHER_PATH_rad:

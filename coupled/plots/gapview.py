@@ -14,10 +14,10 @@ from coupled.gap.effects.effect import Effect
 from coupled.gap.findings.diagnosis import Diagnosis
 from coupled.gap.findings.result import StageResult
 from coupled.gap.findings.summary import plain
+from coupled.gap.prepare import readers_of
 from coupled.gap.search.case import Case
 from coupled.gap.signals.output import Floats, Output
 from coupled.gap.stages.stages import Reader
-from coupled.gap.stages.surfaces import surface_points
 from coupled.gap.thresholds import FAULTY_FROM
 from coupled.record.channels import CONTROL_NAMES
 from coupled.record.record import Record
@@ -139,8 +139,7 @@ class View:
 
     def readers(self, rig: Rig) -> list[Reader]:
         """Return what reads the stages' inputs off each record."""
-        control = self.diagnosis.control
-        return [Reader(rig, r, control, surface_points, i) for i, r in enumerate(self.records)]
+        return readers_of(rig, self.diagnosis.records, self.diagnosis.control)
 
     def time(self, output: Output) -> Floats:
         """Return the time of an output's frames, in s from the record's start."""

@@ -40,7 +40,7 @@ def diagnosis_report(
     sections.append(Section("Figures", tuple(figures)))
     settings = (
         ("rig", whole.nominal.name),
-        ("control", whole.control),
+        ("control" if whole.nominal.controls else "stage", whole.subject),
         ("records", f"{len(whole.records)}, {_seconds(whole):.4g} s in all"),
     )
     return Report("Diagnosis", title, _verdict(whole, system), tuple(sections), settings, made)

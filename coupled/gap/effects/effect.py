@@ -246,9 +246,10 @@ def apply(
     for key, length in lengths.items():
         changes[key] = _level(rig, control, changes) / length if length > 0.0 else 0.0
     changes |= _breakaway(rig, control, changes)
-    data = rig.controls[control]
-    changes["compensation.basic_gradient_N_per_{d}"] = data.assumed_basic_gradient
-    changes["compensation.breakout_N"] = data.assumed_breakout
+    if control in rig.controls:
+        data = rig.controls[control]
+        changes["compensation.basic_gradient_N_per_{d}"] = data.assumed_basic_gradient
+        changes["compensation.breakout_N"] = data.assumed_breakout
     d = unit_of(control)
     return rig.changed({dotted(key, control).format(d=d): new for key, new in changes.items()})
 
@@ -323,8 +324,9 @@ def _breakaway(rig: Rig, control: ControlName, changes: Mapping[str, Any]) -> di
 
     Friction that is added adds at rest, too, so the excess of the breakaway force stays.
     """
-    filed = float(value_of(rig, control, BREAKAWAY))
-    if FRICTION not in changes or BREAKAWAY in changes or filed == 0.0:
+    if FRICTION not in changes or BREAKAWAY in changes:
         return {}
-    running = float(value_of(rig, control, FRICTION))
+    filed, running = (float(value_of(rig, control, key)) for key in (BREAKAWAY, FRICTION))
+    if filed == 0.0:
+        return {}
     return {BREAKAWAY: float(changes[FRICTION]) + max(filed - running, 0.0)}

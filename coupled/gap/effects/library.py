@@ -123,12 +123,14 @@ BY_NAME = {effect.name: effect for effect in EFFECTS}
 
 
 def library_of(rig: Rig, control: ControlName) -> list[Effect]:
-    """Return the library adapted to a rig.
+    """Return the library adapted to a rig; of an aircraft alone, the effects of its `flight`.
 
     A bob weight pulls with the load factor: with one, a time stamp error of the motion also shows
     in the loader. A rig without a servo has other effects of a servo (`without_servo`).
     """
     every = list(EFFECTS)
+    if not rig.controls:
+        return [one for one in every if all(p.key.startswith("flight.") for p in one.parameters)]
     if rig.controls[control].loader.servo_frequency == 0.0:
         every = without_servo(EFFECTS)
     if rig.flight is None or not rig.controls[control].loader.bob_weight:

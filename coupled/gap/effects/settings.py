@@ -24,8 +24,11 @@ MOST_ELASTIC = 0.95
 def settings(rig: Rig, control: ControlName, outputs: Sequence[Output] = ()) -> dict[str, Effect]:
     """Return {effect that frees the same key: nuisance parameter within its tolerance}.
 
-    If an output is of loader and linkage in series, the linkage's parameters show in both.
+    If an output is of loader and linkage in series, the linkage's parameters show in both. An
+    aircraft alone has none.
     """
+    if not rig.controls:
+        return {}
     known = ((effect, _ends(effect, rig, control)) for effect in EFFECTS)
     found = {
         effect.name: setting_of(effect, *ends, every_output=_given(effect, rig, control))
@@ -61,6 +64,8 @@ def contact(rig: Rig, control: ControlName) -> tuple[Effect, ...]:
 
     All dry friction has presliding, of up to half a millimetre, so that its length is no effect.
     """
+    if not rig.controls:
+        return ()
     loader = rig.controls[control].loader
     if loader.friction_stiffness > 0.0:
         return ()
@@ -83,6 +88,8 @@ def most_yielding(control: ControlName) -> float:
 
 def is_dry(rig: Rig, control: ControlName) -> bool:
     """Tell whether a rig file has dry friction."""
+    if not rig.controls:
+        return False
     loader = rig.controls[control].loader
     levels = (loader.friction, loader.breakaway, loader.friction_pull, loader.friction_push)
     return max(*levels, loader.friction_by_load) > 0.0

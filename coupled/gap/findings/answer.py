@@ -187,7 +187,8 @@ def _estimate(
     ends = (low if math.isfinite(low) else None, high if math.isfinite(high) else None)
     filed = float(p.nominal(case.nominal, case.control))
     bounds = [None if end is None else float(p.entered(filed, end)) for end in ends]
-    host = case.nominal.controls[case.control].compensation
+    held = case.nominal.controls.get(case.control)
+    hosted = held is not None and (held.compensation.deflection or held.compensation.gradient)
     return ParameterEstimate(
         name=p.named(case.control),
         value=value,
@@ -199,7 +200,7 @@ def _estimate(
         found=float(p.entered(filed, value)),
         found_low=bounds[0],
         found_high=bounds[1],
-        host=p.host if host.deflection or host.gradient else "",
+        host=p.host if hosted else "",
         relative=p.mode == "factor",
     )
 

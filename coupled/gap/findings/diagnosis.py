@@ -52,7 +52,7 @@ class Diagnosis(Findings, TableResult):
     change: Comparison | None = field(default=None, repr=False, compare=False)
     # Channels whose logs were filtered, and the source of their noise floors.
     filtered: Mapping[str, str] = field(default_factory=dict)
-    # What of live records is not judged, or judged with changes; a sentence each.
+    # What of the records is not judged, or judged with changes; a sentence each.
     left_out: tuple[str, ...] = ()
     # Parameters of the effects found that the records determine only together.
     inseparable: tuple[Alike, ...] = ()
@@ -67,7 +67,12 @@ class Diagnosis(Findings, TableResult):
             for e in self.effects
         )
         words = f"{self.verdict}; {found}" if found else self.verdict
-        return f"Diagnosis({self.nominal.name}, {self.control}: {words})"
+        return f"Diagnosis({self.nominal.name}, {self.subject}: {words})"
+
+    @property
+    def subject(self) -> str:
+        """The control, or the airframe of a rig without controls."""
+        return self.control if self.nominal.controls else "airframe"
 
     def to_polars(self) -> pl.DataFrame:
         """Return a row a parameter of the effects found; the units are in the column `unit`."""
@@ -122,7 +127,7 @@ class Diagnosis(Findings, TableResult):
         """What to record next, in a sentence; empty if no record would help."""
         lacking = [
             worth_recording(self.nominal, self.control, stage.name, stage.missing)
-            for stage in self.stages
+            for stage in (self.stages if self.nominal.controls else ())
         ]
         wanted = [stage.hidden.wanted for stage in self.stages if stage.hidden is not None]
         return in_one_line(self.next_tests, sorted(set().union(*lacking)), wanted)

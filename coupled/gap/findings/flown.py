@@ -145,7 +145,7 @@ def closed_loop(
     `again` is the simulation, if it exists already. None if the record lacks the force or a
     bench's q̄, or if a rig cannot be flown.
     """
-    if nominal.controls[control].drive != "force":
+    if not nominal.controls or nominal.controls[control].drive != "force":
         return None
     again = Again.of(nominal, control, record) if again is None else again
     if again is None:

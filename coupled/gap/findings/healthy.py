@@ -175,8 +175,10 @@ class Baseline:
     @classmethod
     def of(cls, records: Mapping[str, Record], case: Case, found: Fit) -> Baseline:
         """Return the reference from records of the healthy machine and the fit to them."""
-        wide = {**found.rig.controls[case.control].tolerance, **tolerances(case, found)}
-        rig = found.rig.changed({f"controls.{case.control}.tolerance": wide})
+        rig = found.rig
+        if rig.controls:
+            wide = {**rig.controls[case.control].tolerance, **tolerances(case, found)}
+            rig = rig.changed({f"controls.{case.control}.tolerance": wide})
         names = dict.fromkeys(output.channel for output in case.outputs)
         each = {name: [one for one in case.outputs if one.channel == name] for name in names}
         errors = {name: ModelError.of(ours, rig) for name, ours in each.items()}

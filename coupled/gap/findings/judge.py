@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from coupled.gap.chain import BY_NAME as STAGE_OF
-from coupled.gap.chain import CHAIN, stage_of
+from coupled.gap.chain import CHAIN, Stage, stage_of
 from coupled.gap.findings.result import StageResult
 from coupled.gap.findings.where import remains, where
 from coupled.gap.search.found import Choice
@@ -73,7 +73,7 @@ class Judge:
         left, limits = _by_stage(self.last), _by_stage(stage_limits(self.outputs))
         lacking = self._lacking()
         found = []
-        for stage in CHAIN:
+        for stage in CHAIN if self.rig.controls else self._of_aircraft():
             name = stage.name
             result: StageResult | None
             if name in before and name not in lacking:
@@ -93,6 +93,10 @@ class Judge:
                 result = self._without_output(name)
             found += [result] if result is not None else []
         return tuple(found)
+
+    def _of_aircraft(self) -> list[Stage]:
+        """Return the stages of a rig without controls: the airframe, and those of effects found."""
+        return [stage for stage in CHAIN if stage.name in {"airframe", *self.blamed}]
 
     def _hidden(self, stage: str) -> HiddenGap | None:
         """Return what hides a gap of the stage; None if one of its floors is low enough."""

@@ -214,6 +214,11 @@ class Findings:
     settings: tuple[SettingResult, ...]
     budget: tuple[StageBudget, ...]
 
+    @property
+    def subject(self) -> str:
+        """The part of the machine that is judged, in words."""
+        return self.control
+
     @public
     def stage(self, name: str) -> StageResult:
         """Return a stage by its name; KeyError if the results do not have it."""

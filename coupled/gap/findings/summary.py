@@ -109,14 +109,14 @@ def _not_judged(found: Findings) -> str:
 def _what(found: Findings, floor: str) -> str:
     if found.verdict == "no_gap":
         within = "stays within its noise" if floor == NOISE else f"leaves {floor}"
-        return f"No gap in the {found.control}: every stage that could be judged {within}."
+        return f"No gap in the {found.subject}: every stage that could be judged {within}."
     hidden = [stage for stage in found.stages if stage.hidden is not None]
     if hidden and not found.guilty:
         why = "; ".join(f"the {stage.name} is not judged, as {stage.why}" for stage in hidden)
-        return f"Whether the {found.control} has a gap cannot be decided: {why}."
+        return f"Whether the {found.subject} has a gap cannot be decided: {why}."
     if found.verdict == "ambiguous" and not found.guilty:
         return (
-            f"Whether the {found.control} has a gap cannot be said: the rig does not explain the"
+            f"Whether the {found.subject} has a gap cannot be said: the rig does not explain the"
             " healthy records, and their scatter shows no change by a tenth."
         )
     budgets = {one.stage: one for one in found.budget}

@@ -43,6 +43,7 @@ from coupled.gap.thresholds import (
     PRIOR_EFFECT,
     RIVAL_GAIN,
     SHOOTINGS,
+    VERY_STRONG,
 )
 from coupled.parallel import in_threads
 
@@ -53,7 +54,6 @@ Try = tuple[tuple[Effect, ...], Start, Fit]  # effects, start values, parent
 Started = tuple[float, Fit, Fit]  # log evidence, unfinished fit, parent
 COARSE, OWN = Descent("coarse"), Descent("own")
 FIRST, SHORT = Descent("coarse", BEAM_FIRST), Descent("coarse", SHOOTINGS)
-VERY_STRONG = 5.0  # difference of log evidence, 2 ln B > 10: Kass and Raftery 1995
 ABOVE = (1.05, 1.5)  # starts of a breakaway force, over the running friction
 
 

@@ -2,9 +2,9 @@
 
 The measured surface deflections from trim are added to the model's own trim, and the model is
 flown open loop (`openloop`). Rates, angle of attack, sideslip and load factor are compared, since
-errors in them decay within seconds. Attitude, speed and height are not, since they integrate every
-small error. The elevator position in trim is compared too (`trim`). `air` estimates the motion of
-the air.
+errors in them decay within seconds. Speed and pitch attitude integrate every small error, and are
+compared in short segments (`shots`). The elevator position in trim is compared too (`trim`). `air`
+estimates the motion of the air.
 
 If the aircraft's control laws move a surface, the host's command is the input: it is flown through
 JSBSim's laws, and the surface is an output.
@@ -26,11 +26,12 @@ from coupled.gap.noise.smooth import smoothed
 from coupled.gap.signals.air import Air, vertical_air
 from coupled.gap.signals.floors import left_noise
 from coupled.gap.signals.output import Output, estimate_noise, spread, white
-from coupled.gap.stages.openloop import Flown, Moved, flown_in, fly_open_loop
-from coupled.gap.stages.surfaces import moved, surface_channel, surface_points
+from coupled.gap.stages.openloop import Between, Flown, Moved, flown_in, fly_open_loop
+from coupled.gap.stages.shots import SLOW, Restarts, States
+from coupled.gap.stages.surfaces import flown_by, moved, surface_channel, surface_points
 from coupled.gap.stages.trim import Trim, trim_of
-from coupled.gap.thresholds import FLIGHT_KNOWN, UNTRIMMED
-from coupled.record.channels import ControlName, channel, motion_channels
+from coupled.gap.thresholds import FLIGHT_KNOWN, SHOT_KNOWN, SHOT_TRIES, UNTRIMMED
+from coupled.record.channels import LATERAL, ControlName, channel, motion_channels
 from coupled.record.record import Record
 from coupled.rig.parameters import Flight
 from coupled.rig.recorder import stamped
@@ -48,7 +49,7 @@ COMPARED = (
     "sideslip_rad",
 )
 TRIM = "elevator_trim_rad"  # elevator position in trim
-_KEPT = 12  # size of the cache of flights
+_KEPT = 24  # size of the cache of flights
 
 
 class Flights:
@@ -81,6 +82,7 @@ class Model:
     compared: tuple[str, ...]
     air: Air | None
     flights: Flights = field(default_factory=Flights)
+    restarts: Restarts | None = None
 
     def flown(self, rig: Rig) -> Flown | None:
         """Return the compared channels and the trim of `rig`; None if it cannot be trimmed."""
@@ -90,6 +92,33 @@ class Model:
         late = rig.flight.motion_stamp * self.rig.frame_rate if flight.gust_rms > 0.0 else 0.0
         asked = (flight, self.compared, _digest(self.moved), late)
         return self.flights.of(asked, lambda: self.fly(flight, self.moved, late=late))
+
+    def unknown_between(self, plain: Floats) -> Floats:
+        """Return the change of the flight by another interpolation between the rows."""
+        assert self.rig.flight is not None
+        if self.rig.controls or self.rig.flight.steps_per_frame == 1:
+            return np.zeros_like(plain)
+        flight = changed(self.rig.flight, {"motion_stamp_s": 0.0}, self.rig.name, "flight")
+        return self.fly(flight, self.moved, between="spline").motion - plain
+
+    def shots(self, rig: Rig) -> Floats | None:
+        """Return speed and pitch attitude with restarts; None if `rig` cannot be trimmed."""
+        assert rig.flight is not None and self.restarts is not None
+        flight = changed(rig.flight, {"motion_stamp_s": 0.0}, self.rig.name, "flight")
+        late, states = rig.flight.motion_stamp * self.rig.frame_rate, self.restarts
+        asked = (flight, SLOW, _digest(self.moved), late)
+        flown = self.flights.of(
+            asked, lambda: self.fly(flight, self.moved, late=late, restarts=states.at(late))
+        )
+        return None if flown is None else flown.motion[:, 1:]
+
+    def wrong_shots(self, wrong: Sequence[Moved], plain: Floats) -> list[Floats]:
+        """Return the changes of speed and attitude by errors of surfaces, air and restarts."""
+        assert self.rig.flight is not None and self.restarts is not None
+        flight = changed(self.rig.flight, {"motion_stamp_s": 0.0}, self.rig.name, "flight")
+        each = [self.restarts.wrong(sample) for sample in range(SHOT_TRIES)]
+        flown = [self.fly(flight, wrong, with_error=True, restarts=states) for states in each]
+        return [one.motion[:, 1:] - plain for one in flown]
 
     def carried(self, wrong: Sequence[Moved], plain: Flown) -> Floats:
         """Return the change of the flight by errors of the surfaces' motion and of the air."""
@@ -101,9 +130,15 @@ class Model:
         return flown.motion - plain.motion
 
     def fly(
-        self, flight: Flight, moved: Sequence[Moved], with_error: bool = False, late: float = 0.0
+        self,
+        flight: Flight,
+        moved: Sequence[Moved],
+        with_error: bool = False,
+        late: float = 0.0,
+        between: Between = "pchip",
+        restarts: States | None = None,
     ) -> Flown:
-        """Return the flight with the given surface motion.
+        """Return the flight with the given surface motion, interpolated between the rows.
 
         `with_error` adds a sample of its error to the air, whose estimate is `late` frames late.
         """
@@ -112,9 +147,12 @@ class Model:
             moves = self.air.speed * (flight.gust_rms / self.air.rms)
             moves = stamped(moves + self.air.error if with_error else moves, -late)
             air = (*moves[1:].tolist(), 0.0)  # row k + 1 holds the air over the frame before
-        controls, rate_Hz = list(self.rig.controls), self.rig.frame_rate
-        given = (flight, rate_Hz, controls, moved, self.compared, air)
-        return fly_open_loop(*given, *flown_in(self.record, controls, rate_Hz))
+        controls, rate_Hz = flown_by(self.rig), self.rig.frame_rate
+        channels = self.compared if restarts is None else (RATE, *SLOW)
+        given = (flight, rate_Hz, controls, moved, channels, air)
+        known = flown_in(self.record, controls, rate_Hz)
+        between = "held" if self.rig.controls else between
+        return fly_open_loop(*given, known, between_rows=between, restarts=restarts)
 
 
 def _digest(moved: Sequence[Moved]) -> bytes:
@@ -132,7 +170,7 @@ def needs(rig: Rig, record: Record) -> tuple[str, ...]:
 
     They include the command of a control that was moved and has no surface position.
     """
-    own = (surface_channel("column"),) if "column" in rig.controls else ()
+    own = (surface_channel("column"),) if "column" in flown_by(rig) else ()
     found: tuple[str, ...] = (RATE, *own)
     for control in rig.controls:
         by_position = surface_channel(control) in record and surface_points(rig, control)
@@ -155,26 +193,29 @@ def airframe_outputs(
     """
     if rig.flight is None or any(name not in record for name in needs(rig, record)):
         return []
-    known = motion_channels(list(rig.controls), flown=True)
-    by_laws = [surface_channel(c) for c in rig.controls if surface_points(rig, c) is None]
-    wanted = [name for name in (*COMPARED, *by_laws) if name in known and name in record]
+    judged = _known_motion(rig, record)
+    by_laws = [surface_channel(c) for c in flown_by(rig) if surface_points(rig, c) is None]
+    wanted = [name for name in (*COMPARED, *by_laws) if name in judged and name in record]
     compared = tuple(name for name in wanted if np.ptp(record[name]) > 0.0)
-    each = {control: trim_of(rig, record, control) for control in rig.controls}
+    each = {control: trim_of(rig, record, control) for control in flown_by(rig)}
     trims = {control: trim for control, trim in each.items() if trim is not None}
     places = {control: (trim.position, trim.jump) for control, trim in trims.items()}
     right, wrong = moved(rig, record, places, np.random.default_rng(43))
     air = vertical_air(record, 1.0 / rig.frame_rate)
-    model = Model(rig, record, right, compared, air, Flights() if flights is None else flights)
+    known = Flights() if flights is None else flights
+    restarts = Restarts.of(record, rig.frame_rate)
+    model = Model(rig, record, right, compared, air, known, restarts)
     flown = model.flown(rig)
     assert flown is not None  # the filed rig can be trimmed
     carried = model.carried(wrong, flown)
+    unknown = model.unknown_between(flown.motion)
     outputs = []
     for i, name in enumerate(compared):
         noise = left_noise(
             estimate_noise(record[name]), record[name], record[name] - flown.motion[:, i]
         )
         own = float(np.hypot(noise.rms, FLIGHT_KNOWN * np.ptp(record[name])))
-        moved_by = float(np.sqrt(np.mean(carried[:, i] ** 2)))
+        moved_by = float(np.sqrt(np.mean(carried[:, i] ** 2 + unknown[:, i] ** 2)))
         floor = float(np.hypot(own, moved_by))
         loose = spread([carried[:, i]], own, noise.memory, rig.frame_rate)
 
@@ -188,9 +229,51 @@ def airframe_outputs(
 
         given = (record[name], predict, floor, rig.frame_rate, number, loose, moved_by / floor)
         outputs.append(Output("airframe", name, *given))
+    if restarts is not None:
+        outputs += _slow_outputs(model, wrong, number)
     if "column" in trims:
         outputs.append(_trim_output(model, record, trims["column"], number))
     return outputs
+
+
+def _slow_outputs(model: Model, wrong: Sequence[Moved], number: int) -> list[Output]:
+    """Return speed and pitch attitude, predicted in segments restarted as measured."""
+    record, rate_Hz = model.record, model.rig.frame_rate
+    shots = model.shots(model.rig)
+    assert shots is not None  # the filed rig can be trimmed
+    carried = model.wrong_shots(wrong, shots)
+    outputs = []
+    for i, name in enumerate(SLOW):
+        noise = left_noise(estimate_noise(record[name]), record[name], record[name] - shots[:, i])
+        own = float(np.hypot(noise.rms, SHOT_KNOWN * np.ptp(record[name])))
+        errors = [one[:, i] for one in carried]
+        moved_by = float(np.sqrt(np.mean(np.square(errors))))
+        floor = float(np.hypot(own, moved_by))
+        loose = spread(errors, own, noise.memory, rate_Hz)
+
+        def predict(other: Rig, i: int = i, name: str = name, floor: float = floor) -> Floats:
+            assert other.flight is not None
+            made = model.shots(other)
+            if made is None:
+                return record[name] + UNTRIMMED * floor
+            return stamped(np.asarray(made[:, i]), other.flight.motion_stamp * rate_Hz)
+
+        given = (record[name], predict, floor, rate_Hz, number, loose, moved_by / floor)
+        outputs.append(Output("airframe", name, *given))
+    return outputs
+
+
+def _known_motion(rig: Rig, record: Record) -> tuple[str, ...]:
+    """Return the motion's channels that the surfaces of a record determine.
+
+    An aircraft alone is flown by all its surfaces: without the positions of aileron and rudder in
+    the record, its lateral motion is not known.
+    """
+    known = motion_channels(flown_by(rig), flown=True)
+    beside = (surface_channel("wheel"), surface_channel("pedals"))
+    if rig.controls or all(name in record for name in beside):
+        return known
+    return tuple(name for name in known if name not in LATERAL)
 
 
 def _trim_output(model: Model, record: Record, trim: Trim, number: int) -> Output:
@@ -198,7 +281,7 @@ def _trim_output(model: Model, record: Record, trim: Trim, number: int) -> Outpu
 
     The trim is measured over a part of the rows, so the noise floor is higher than the noise.
     """
-    position, at = record[surface_channel("column")], list(model.rig.controls).index("column")
+    position, at = record[surface_channel("column")], flown_by(model.rig).index("column")
     noise = position - smoothed(position)
     noise *= white(position) / max(float(np.std(noise)), 1e-12)
     floor = max(trim.error * math.sqrt(len(position)), 1e-9)

@@ -10,9 +10,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from threading import Lock
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline, PchipInterpolator
 
 from coupled.flight.aircraft import make_aircraft
 from coupled.flight.airframe import JSBSimAirframe
@@ -21,15 +23,20 @@ from coupled.flight.everyframe import PROPERTIES
 from coupled.flight.gusts import Gusts
 from coupled.flight.wrapper import Wrapper
 from coupled.gap.signals.conditions import trim_shift, wrappers_of
+from coupled.gap.stages.shots import States
 from coupled.gap.thresholds import LOST_MOTION, SAME_TRIM_rad
 from coupled.record.channels import ControlName, motion_channels
 from coupled.record.record import Record
 from coupled.resources import aircraft_folder
 from coupled.rig.parameters import Flight
 from coupled.schema import changed
+from coupled.units import FOOT_m
 
 Floats = NDArray[np.float64]
 Points = tuple[Floats, Floats]
+FlownIn = tuple[Sequence[Wrapper], Floats]
+Between = Literal["held", "pchip", "spline"]
+_SI = {"true_airspeed_m_per_s": FOOT_m, "altitude_m": FOOT_m}  # JSBSim has the others in SI
 _flying = Lock()  # JSBSim holds the GIL, so two flights at once would only alternate
 
 
@@ -79,10 +86,11 @@ class Flown:
     trim: tuple[float, ...]  # rad, in the order of the controls
 
 
-def flown_in(
-    record: Record, controls: Sequence[ControlName], frame_rate_Hz: float
-) -> tuple[list[Wrapper], Floats]:
-    """Return the conditions of a record's flight and the trims they move (`fly_open_loop`)."""
+def flown_in(record: Record, controls: Sequence[ControlName], frame_rate_Hz: float) -> FlownIn:
+    """Return the conditions of a record's flight, and the commands by which they move the trim.
+
+    The commands have the shape (frames, controls). Recorded surface positions include them.
+    """
     frame_s = 1.0 / frame_rate_Hz
     trims = np.column_stack([trim_shift(record, control, frame_s) for control in controls])
     return wrappers_of(record, frame_s), trims
@@ -95,18 +103,28 @@ def fly_open_loop(
     moved: Sequence[Moved],
     channels: Sequence[str],
     air_m_per_s: Sequence[float] | None = None,
-    conditions: Sequence[Wrapper] = (),
-    trims: Floats | None = None,
+    flown: FlownIn | None = None,
+    *,
+    between_rows: Between = "held",
+    restarts: States | None = None,
 ) -> Flown:
     """Return the flight of a model from its trim, driven by its surfaces; a row for each frame.
 
-    `air_m_per_s` is the vertical speed of the air over each frame. The `conditions` act on the
-    model as on the aircraft. `trims` are the commands by which they move the trim, shape (frames,
-    controls), which the surface positions include. Raises InputError if the model cannot be
-    trimmed.
+    `air_m_per_s` is the vertical speed of the air over each frame. The conditions of the record's
+    flight (`flown_in`) act on the model as on the aircraft. `between_rows` is how the commands
+    change over a frame of several steps: `held`, as those of a host, or interpolated. `restarts`
+    are states of the motion from which the flight goes on, by row. Raises InputError if the model
+    cannot be trimmed.
     """
     still = changed(flight, STILL, "rig", "flight")
-    frame_s = 1.0 / frame_rate_Hz
+    frame_s, steps = 1.0 / frame_rate_Hz, 1
+    if between_rows != "held" and flight.steps_per_frame > 1:
+        steps = flight.steps_per_frame
+        still = changed(still, {"steps_per_frame": 1}, "rig", "flight")
+        frame_s /= steps
+        air_m_per_s = None if air_m_per_s is None else np.repeat(air_m_per_s, steps).tolist()
+    conditions: Sequence[Wrapper] = () if flown is None else flown[0]
+    trims = None if flown is None else flown[1]
     gusts = Gusts(still, frame_s, air_m_per_s=air_m_per_s)
     with _flying:
         models = [aircraft_folder()]
@@ -121,22 +139,38 @@ def fly_open_loop(
             if trims is not None and one.points is not None:
                 asked[1:-1, i] -= trims[:-1, i]  # a row results from the frame before it
         asked[-1] = asked[-2]
-        return Flown(_motion(airframe, asked[1:], channels), trim)
+        asked = asked[1:] if steps == 1 else _between(asked, steps, between_rows)
+        states = {row * steps: state for row, state in (restarts or {}).items()}
+        return Flown(_motion(airframe, asked, channels, states)[::steps], trim)
 
 
-def _motion(airframe: JSBSimAirframe, asked: Floats, channels: Sequence[str]) -> Floats:
-    """Return the channels, shape (frames, channels), of a flight with commands about trim.
+def _between(asked: Floats, steps: int, how: Between) -> Floats:
+    """Return the commands at each step after the first row, shape ((rows − 1)·steps, controls)."""
+    rows = np.arange(len(asked))
+    at = (1.0 + np.arange((len(asked) - 1) * steps)) / steps
+    law = PchipInterpolator if how == "pchip" else CubicSpline
+    return np.asarray(law(rows, asked, axis=0)(at))
 
-    A row results from the commands of the row before.
+
+def _motion(
+    airframe: JSBSimAirframe, asked: Floats, channels: Sequence[str], restarts: States
+) -> Floats:
+    """Return the channels, SI, shape (steps, channels), of a flight with commands about trim.
+
+    A row results from the commands of the row before, or is a state of `restarts`.
     """
     each = [airframe.reader(PROPERTIES[name]) for name in channels]
     step, readers = airframe.step, [read for read in each if read is not None]
     motion: list[list[float]] = []
-    for a, b, c in asked.tolist():
+    for k, (a, b, c) in enumerate(asked.tolist()):
         now = [read() for read in readers]
+        if (state := restarts.get(k)) is not None:
+            airframe.put(state)
+            put = zip(channels, readers, strict=True)
+            now = [state[n] / _SI.get(n, 1.0) if n in state else read() for n, read in put]
         if not abs(now[0]) <= LOST_MOTION:  # true for NaN too
             motion += [motion[-1] if motion else now] * (len(asked) - len(motion))
             break
         motion.append(now)
         step((a, b, c))
-    return np.array(motion)
+    return np.array(motion) * [_SI.get(name, 1.0) for name in channels]

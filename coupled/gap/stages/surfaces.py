@@ -29,7 +29,14 @@ from coupled.gap.thresholds import (
     SURFACE_MOVES_rad,
     SURFACE_SHAKE_s,
 )
-from coupled.record.channels import SURFACES, VALIDITY, ControlName, channel, motion_channels
+from coupled.record.channels import (
+    CONTROL_NAMES,
+    SURFACES,
+    VALIDITY,
+    ControlName,
+    channel,
+    motion_channels,
+)
 from coupled.record.record import Record
 from coupled.resources import aircraft_folder
 from coupled.rig.parameters import Flight
@@ -46,6 +53,11 @@ def surface_channel(control: ControlName) -> str:
     return f"{SURFACES[control]}_rad"
 
 
+def flown_by(rig: Rig) -> tuple[ControlName, ...]:
+    """Return the controls whose surfaces drive the model: all if the rig has no control."""
+    return tuple(rig.controls) or CONTROL_NAMES
+
+
 def surface_points(rig: Rig, control: ControlName) -> Points | None:
     """Return commands about trim and the surface positions that the model gives them, rad.
 
@@ -53,7 +65,7 @@ def surface_points(rig: Rig, control: ControlName) -> Points | None:
     """
     assert rig.flight is not None
     plain = changed(rig.flight, UNALTERED, rig.name, "flight")
-    return _points(plain.model_dump_json(), tuple(rig.controls), rig.frame_rate, control)
+    return _points(plain.model_dump_json(), flown_by(rig), rig.frame_rate, control)
 
 
 @lru_cache(maxsize=64)
@@ -101,7 +113,7 @@ def filed_trim(rig: Rig, control: ControlName) -> float:
     """Return a surface's position in the trim to which `surface_points` refers, rad."""
     assert rig.flight is not None
     plain = changed(rig.flight, UNALTERED, rig.name, "flight")
-    controls = tuple(rig.controls)
+    controls = flown_by(rig)
     return _trim(plain.model_dump_json(), controls, rig.frame_rate)[controls.index(control)]
 
 
@@ -109,7 +121,7 @@ def own_trim(rig: Rig, control: ControlName) -> float:
     """Return a surface's position in the trim of the rig's own aircraft, rad."""
     assert rig.flight is not None
     still = changed(rig.flight, STILL, rig.name, "flight")
-    controls = tuple(rig.controls)
+    controls = flown_by(rig)
     return _trim(still.model_dump_json(), controls, rig.frame_rate)[controls.index(control)]
 
 
@@ -129,13 +141,13 @@ def moved(
 ) -> tuple[list[Moved], list[Moved]]:
     """Return the motion of the surfaces, and the same with a sample of its error.
 
-    In the order of the rig's controls. `trims` are the positions in trim, rad, and the jumps from
+    In the order of `flown_by`. `trims` are the positions in trim, rad, and the jumps from
     there after the first row, which are not smoothed. A control without any channel in the record
     is taken as not moved.
     """
     found = list[Moved]()
     wrong = list[Moved]()
-    for control in rig.controls:
+    for control in flown_by(rig):
         name, points = surface_channel(control), surface_points(rig, control)
         if name not in record or points is None:
             one = Moved(name, _asked(rig, record, control))

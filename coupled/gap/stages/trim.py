@@ -23,7 +23,14 @@ from coupled.gap.noise.smooth import smoothed
 from coupled.gap.signals.conditions import trim_shift
 from coupled.gap.signals.output import estimate_noise, memory, white
 from coupled.gap.stages.openloop import about, flown_in, fly_open_loop
-from coupled.gap.stages.surfaces import filed_trim, moved, own_trim, surface_channel, surface_points
+from coupled.gap.stages.surfaces import (
+    filed_trim,
+    flown_by,
+    moved,
+    own_trim,
+    surface_channel,
+    surface_points,
+)
 from coupled.gap.thresholds import (
     TRIM_ANSWERED,
     TRIM_SIGMAS,
@@ -144,8 +151,8 @@ def _followed(
     lefts = []
     for trim, jump in ((own, there - own), (there, 0.0)):
         surfaces, _ = moved(rig, short, {control: (trim, jump)}, np.random.default_rng(43))
-        given = (rig.flight, rig.frame_rate, list(rig.controls), surfaces, names, None)
-        flown = fly_open_loop(*given, *flown_in(short, list(rig.controls), rig.frame_rate))
+        given = (rig.flight, rig.frame_rate, flown_by(rig), surfaces, names, None)
+        flown = fly_open_loop(*given, flown_in(short, flown_by(rig), rig.frame_rate))
         left = np.column_stack([short[n] - flown.motion[:, i] for i, n in enumerate(names)])
         linear = _lagged(smoothed(short[surface_channel(control)]), rig.frame_rate)
         left -= linear @ np.linalg.lstsq(linear, left, rcond=None)[0]

@@ -67,6 +67,8 @@ def import_log(
     grids = lay_grids(logs, log_map, map_file, rate)
     grid = grids[main.name]
     warnings = [*_notes(logs), *_clock_warnings(grid)]
+    if map_file == files[0] and log_map.clock.start > 0.0:
+        warnings.append("the first row is from before JSBSim's trim, and is left out")
     names = [name for name in CHANNELS if name in log_map.channels]
     record, logged, filled = {}, {}, {}
     for name in names:

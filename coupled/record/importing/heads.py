@@ -11,15 +11,20 @@ programs of its users the pitch rate), and positions of controls (shares of an u
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+
+import numpy as np
 
 from coupled.errors import InputError
 from coupled.files import open_file
 from coupled.record.importing.mapping import CHANNELS, Channel, Clock, Layout, LogMap
 
 LOOKED_AT_bytes = 2**17  # of a file, which contain its head
+ANGLES = ("pitch_rad", "alpha_rad")
+JUMPS = 20.0  # chosen: times the next steps, above which a step is none of a flight
+LEAST_JUMP_rad = 1e-5
 # A column's name, with its channel and unit.
 _JSBSIM = {
     "q bar (psf)": ("dynamic_pressure_Pa", "psf"),
@@ -125,8 +130,27 @@ def known_map(path: Path) -> tuple[str, LogMap]:
         raise InputError(path, "", f"{problem}: give --map")
     ordered = {name: channels[name] for name in CHANNELS if name in channels}
     layout = Layout(format="csv", delimiter=head.delimiter)
-    clock = Clock(source=head.time, unit="s")
+    angles = [names.index(channels[name].source) for name in ANGLES if name in channels]
+    start_s = _trimmed_from(text, angles) if head.program == "JSBSim" else 0.0
+    clock = Clock(source=head.time, unit="s", start=start_s)
     return head.program, LogMap(log=layout, clock=clock, channels=ordered)
+
+
+def _trimmed_from(text: str, columns: Sequence[int]) -> float:
+    """Return the start of JSBSim's log in s: its second row if the first is from before the trim.
+
+    An angle that no force can move within a frame then jumps once.
+    """
+    lines = [line for line in text.splitlines() if line.strip()][1:5]
+    try:
+        rows = np.array([[float(cell) for cell in line.split(",")] for line in lines])
+    except ValueError:
+        return 0.0
+    if len(rows) < 4 or not columns:
+        return 0.0
+    first, *later = np.abs(np.diff(rows[:, list(columns)], axis=0))
+    jumps = first > np.maximum(JUMPS * np.max(later, axis=0), LEAST_JUMP_rad)
+    return float(rows[1, 0] - rows[0, 0]) if jumps.any() else 0.0
 
 
 def _head(line: str) -> tuple[_Head, list[str]] | None:

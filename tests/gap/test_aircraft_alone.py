@@ -1,0 +1,140 @@
+"""Logs of other programs, imported without a map, and diagnosed by a rig of an aircraft alone."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from coupled import load_rig
+from coupled.errors import InputError
+from coupled.gap.diagnose import diagnose
+from coupled.gap.findings.diagnosis import Diagnosis
+from coupled.gap.stages.airframe import airframe_outputs
+from coupled.gap.stages.alone import at_rate_of, motion_alone
+from coupled.record.importing.convert import import_log
+from coupled.record.record import Record
+from coupled.resources import shipped_rigs
+from coupled.rig.rig import Rig
+from coupled.rig.rigfile import read_rig
+from tests.support.commands import coupled
+from tests.support.ownlogs import flightgear_log, flown
+
+
+def alone(name: str = "c172p") -> Rig:
+    """Return a shipped rig without its controls."""
+    return read_rig(shipped_rigs()[name]).changed({"controls": {}, "noise": {}})
+
+
+def without(record: Record, *names: str) -> Record:
+    kept = [name for name in record.channels if name not in names]
+    data = np.column_stack([record[name] for name in kept])
+    return Record(tuple(kept), data, record.manifest)
+
+
+def factor(found: Diagnosis, name: str) -> tuple[float, float, float]:
+    """Return the only effect's factor with its interval, after a check of its name."""
+    (effect,) = found.effects
+    (number,) = effect.parameters
+    assert (found.verdict, effect.name) == ("effect", name)
+    assert number.low is not None and number.high is not None
+    return number.low, number.value, number.high
+
+
+def test_a_log_of_jsbsim_shows_what_was_edited_in_its_model(tmp_path: Path) -> None:
+    log, _ = flown(tmp_path, {"/Cmq": 0.7}, 16.0, rate_Hz=30.0)
+    alone().save(tmp_path / "air.toml")
+    done = coupled(tmp_path, "import", log.name, "-o", "r.csv")
+    assert (done.returncode, done.stderr) == (0, "")
+    words = ("diagnose", "r.csv", "--rig", "air.toml", "--improve", "new.toml")
+    done = coupled(tmp_path, *words, "--json", "found.json")
+    assert done.returncode == 0, done.stderr
+    found = json.loads((tmp_path / "found.json").read_text())
+    assert (found["verdict"], list(found["stages"])) == ("effect", ["airframe"])
+    assert "calibrated_airspeed_m_per_s 46.3 → 52" in found["trim"]
+    (effect,) = found["effects"]
+    number = effect["parameters"]["factor"]
+    assert effect["name"] == "pitch_damping"
+    assert number["low"] < 0.7 < number["high"]
+    assert number["value"] == pytest.approx(0.7, abs=0.01)
+    improved = load_rig(tmp_path / "new.toml")
+    assert improved == alone().changed({"flight.pitch_damping": improved["flight.pitch_damping"]})
+    assert improved["flight.pitch_damping"] == pytest.approx(number["value"])
+
+
+def test_a_log_of_flightgear_shows_what_was_edited_in_its_model(tmp_path: Path) -> None:
+    _, rows = flown(tmp_path, {"/Cmalpha": 0.8}, 16.0)
+    record, account = import_log(flightgear_log(tmp_path / "fg.csv", rows))
+    assert (account.clock.frame_rate_Hz, account.unmapped) == (60.0, ())
+    found = diagnose(alone(), {"log": record})
+    assert (found.nominal.frame_rate, found.nominal["flight.steps_per_frame"]) == (60.0, 2)
+    assert (found.closed_loop, found.in_flight, found.next_test) == (None, None, "")
+    low, value, high = factor(found, "pitch_stiffness")
+    assert low < 0.8 < high
+    assert value == pytest.approx(0.8, abs=0.01)
+
+
+@pytest.fixture(scope="module")
+def healthy(tmp_path_factory: pytest.TempPathFactory) -> Record:
+    """Return the record of a log of the model as it is, with all controls moved."""
+    log, _ = flown(tmp_path_factory.mktemp("healthy"), {}, 12.0)
+    return import_log(log)[0]
+
+
+def test_a_log_of_the_same_model_has_no_gap(healthy: Record) -> None:
+    assert np.ptp(healthy["roll_rad"]) > 0.05
+    found = diagnose(alone(), {"log": healthy})
+    assert found.verdict == "no_gap"
+    assert "No gap in the airframe: every stage that could be judged" in found.summary
+    assert repr(found) == "Diagnosis(c172p, airframe: no_gap)"
+
+
+def test_the_lateral_motion_is_compared_if_aileron_and_rudder_are_recorded(healthy: Record) -> None:
+    def compared(record: Record) -> set[str]:
+        return {output.channel for output in airframe_outputs(alone(), record)}
+
+    assert {"roll_rate_rad_per_s", "sideslip_rad"} < compared(healthy)
+    assert compared(without(healthy, "rudder_rad")) == {
+        *("pitch_rate_rad_per_s", "alpha_rad", "load_factor", "elevator_trim_rad")
+    }
+
+
+def test_a_fault_of_the_forces_is_not_judged_by_an_aircraft_alone(healthy: Record) -> None:
+    forced = Record(
+        (*healthy.channels, "column_force_N", "column_computed_m"),
+        np.column_stack([healthy.data, np.ones((len(healthy), 2))]),
+    )
+    assert motion_alone({"log": forced})["log"].channels == healthy.channels
+
+
+def test_a_rig_takes_the_frame_rate_of_a_log_and_keeps_its_own_steps(healthy: Record) -> None:
+    def rate_of(every: int) -> tuple[float, int]:
+        slow = Record(healthy.channels, healthy.data[::every])
+        rig = at_rate_of(alone(), slow)
+        return rig.frame_rate, rig["flight.steps_per_frame"]
+
+    assert [rate_of(every) for every in (1, 2, 5)] == [(120.0, 1), (60.0, 2), (24.0, 5)]
+
+
+@pytest.mark.parametrize("name", ["elevator_rad", "pitch_rate_rad_per_s"])
+def test_a_log_without_elevator_or_pitch_rate_is_refused(healthy: Record, name: str) -> None:
+    with pytest.raises(InputError, match=f"log: {name}: is missing; the rig has an aircraft only"):
+        diagnose(alone(), {"log": without(healthy, name)})
+
+
+def test_an_elevator_moved_by_control_laws_is_refused(healthy: Record) -> None:
+    fighter = alone().changed(
+        {
+            "flight": {
+                "model": "f16",
+                "altitude_m": 3000.0,
+                "calibrated_airspeed_m_per_s": 150.0,
+                "direct_controls": False,
+            }
+        }
+    )
+    lacking = without(healthy, "true_airspeed_m_per_s")
+    with pytest.raises(InputError, match=r"flight\.model: f16 has control laws.*controls\.column"):
+        diagnose(fighter, {"log": lacking})
