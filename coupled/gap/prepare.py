@@ -24,6 +24,7 @@ from coupled.gap.signals.reading import worth_recording
 from coupled.gap.stages.airframe import Flights, airframe_outputs
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points
+from coupled.gap.stages.terms import with_terms
 from coupled.gap.stages.tried import tried_effects
 from coupled.gap.thresholds import RIGS_KEPT
 from coupled.gap.trimmed import trim_speed, trimmed
@@ -57,9 +58,11 @@ def prepare(
     control: ControlName = "column",
     tell: Tell | None = None,
     baseline: Baseline | None = None,
+    terms: bool = False,
 ) -> Prepared:
     """Return records prepared for a diagnosis, by their files' names.
 
+    With `terms`, the named functions of the model's aerodynamics are tried (`stages.terms`).
     With a `baseline`, the rig is that of the healthy machine, and its model error raises the noise
     floors. Raises InputError if a record cannot be of this rig, or if no stage can be judged.
     """
@@ -80,7 +83,10 @@ def prepare(
     ]
     if not outputs:
         raise InputError(next(iter(records)), "", _too_little(rig, control, judged.readers))
-    library = tried_effects(library_of(rig, control), judged.readers, outputs)
+    library = library_of(rig, control)
+    library = tried_effects(
+        with_terms(library, rig, records) if terms else library, judged.readers, outputs
+    )
     return Prepared(
         Case(rig, control, outputs, tell, judged.under, model_error_in_floors=baseline is not None),
         tuple(library),

@@ -100,6 +100,7 @@ def fly_open_loop(
 ) -> Flown:
     """Return the flight of a model from its trim, driven by its surfaces; a row for each frame.
 
+    A channel may be any property of the model, in JSBSim's unit; it is 0 if the model lacks it.
     `air_m_per_s` is the vertical speed of the air over each frame. The `conditions` act on the
     model as on the aircraft. `trims` are the commands by which they move the trim, shape (frames,
     controls), which the surface positions include. Raises InputError if the model cannot be
@@ -129,8 +130,8 @@ def _motion(airframe: JSBSimAirframe, asked: Floats, channels: Sequence[str]) ->
 
     A row results from the commands of the row before.
     """
-    each = [airframe.reader(PROPERTIES[name]) for name in channels]
-    step, readers = airframe.step, [read for read in each if read is not None]
+    each = [airframe.reader(PROPERTIES.get(name, name)) for name in channels]
+    step, readers = airframe.step, [read or float for read in each]
     motion: list[list[float]] = []
     for a, b, c in asked.tolist():
         now = [read() for read in readers]
