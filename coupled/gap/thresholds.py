@@ -122,6 +122,7 @@ SURFACE_MOVES_rad = 1e-4  # chosen: above which the aircraft moves a surface its
 SURFACE_GUST_m_per_s = 3.0  # chosen: upward gust during this test
 SAME_TRIM_rad = 1e-9  # chosen: largest difference of two trims of one model
 TRIM_s = 1.0  # chosen: from a record's start, over which the trim is measured
+FIRST_ROWS = 12  # chosen: rows whose mean is the position before a surface moves
 TRIM_SIGMAS = 4.0  # chosen: of its noise, above which a record's trim differs from the model's
 TRIM_STILL = 0.25  # chosen: of the difference, the largest earlier motion by a command
 TRIM_ANSWERED = 13.8  # χ² of two parameters, exceeded by chance in 1 of 1000
@@ -263,6 +264,7 @@ SETTING_NUDGE = 0.5  # chosen: of a setting's tolerance, at which its signature 
 
 # The next test (`proposal`), and the flight again (`flown`).
 TEST_s, TEST_EDGE_s = 15.0, 0.25  # chosen: of a test, and in which a hand begins or ends a push
+PUSHED = 2.0  # chosen: rms of a force over its noise, above which a control is pushed
 SEPARATED_GAIN = 10.0  # chosen: log-likelihood gain that discriminates two effects
 SAME_FLIGHT = 0.01  # chosen: of the mean logarithm, by which an improved rig may fly further off
 PROFILE_EVERY = 12  # chosen: frames between the points of a bench's q̄

@@ -218,7 +218,7 @@ def _other_force(scene: Scene) -> Floats:
 def _about_trim(scene: Scene, surface: str) -> Floats:
     """Return a surface's position from where the record begins, °."""
     position = scene.smooth(surface)
-    return (position - position[0]) / DEGREE_rad
+    return np.asarray((position - position[0]) / DEGREE_rad)
 
 
 def _in_degrees(name: str, scene: Scene, rig: Rig | None) -> Floats:

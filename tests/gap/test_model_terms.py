@@ -9,6 +9,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from coupled.errors import InputError
 from coupled.flight.airframe import main_file
@@ -18,12 +19,16 @@ from coupled.gap.effects.airframe import AIRFRAME, term
 from coupled.gap.effects.effect import Effect, apply, value_of
 from coupled.gap.effects.library import BY_NAME, EFFECTS
 from coupled.gap.findings.flown import fly_force
+from coupled.gap.findings.proposal import ProposedTest, in_one_line, next_tests
 from coupled.gap.prepare import prepare, readers_of
 from coupled.gap.search.beam import search_sets
-from coupled.gap.search.found import Choice
+from coupled.gap.search.case import Case
+from coupled.gap.search.found import Candidate, Choice, Fit, Found
 from coupled.gap.signals.output import Output
 from coupled.gap.stages.terms import with_terms
 from coupled.gap.stages.tried import tried_effects
+from coupled.gap.thresholds import SEPARATED_GAIN
+from coupled.record.channels import LATERAL
 from coupled.record.record import Record
 from coupled.resources import shipped_rigs
 from coupled.rig.rig import Rig
@@ -90,6 +95,49 @@ def test_a_wrong_function_is_named_with_its_property(cessna: Rig, worn: Record) 
     assert found.fit.rig.flight.terms == {CLP: pytest.approx(0.702, abs=0.01)}
 
 
+def test_functions_that_act_alike_are_a_group_with_names_as_in_the_model() -> None:
+    """Two functions of a moment, whose signatures differ by less than the noise."""
+    first, second, noise = np.random.default_rng(8).normal(size=(3, 3000))
+    names = ("aero/moment/Roll_damp", "aero/moment/Roll_yaw")
+
+    def predict(rig: Rig) -> NDArray[np.float64]:
+        assert rig.flight is not None
+        one, other = (rig.flight.terms.get(name, 1.0) - 1.0 for name in names)
+        return np.asarray(40.0 * (one * first + other * (first + 0.001 * second)))
+
+    rate = "roll_rate_rad_per_s"
+    output = Output("airframe", rate, -12.0 * first + noise, predict, 1.0, 120.0)
+    case = Case(read_rig(shipped_rigs()["c172p"]), "wheel", [output])
+    found = search_sets(case, [term(name, "ROLL") for name in names])[1]
+    (step,) = found.steps
+    assert {step.effect.of, *(rival.effect.of for rival in step.rivals)} == {*names}
+    pair = (step.effect.name, step.rivals[0].effect.name)
+    said = in_one_line([ProposedTest("steps that are held of ±8 N on the wheel", pair, 50.0)], ())
+    assert "aero/moment/Roll_damp" in said and "aero/moment/Roll_yaw" in said
+
+
+@pytest.mark.slow
+def test_the_manoeuvre_that_separates_two_functions_moves_the_control_that_does(
+    cessna: Rig,
+) -> None:
+    record = fly_force(noisy(cessna), {"wheel": pulses(cessna, 14.0)["wheel"]}, seed=3)
+    terms = [term(f"aero/coefficient/{name}", "ROLL") for name in ("Clp", "Clb")]
+    known = [
+        (values := {one.value_key(one.free[0]): 0.7}, apply(cessna, "column", [one], values))
+        for one in terms
+    ]
+    fits = [
+        Fit((one,), values, values, values, (), rig, 0.0)
+        for one, (values, rig) in zip(terms, known, strict=True)
+    ]
+    step = Found(terms[0], 9.0, 0.5, (Candidate(9.0, terms[1], fits[1]),))
+    choice = Choice((step,), fits[0], fits[0], {}, ())
+    best, *_ = next_tests(cessna, record, "column", choice)
+    assert "on the wheel" in best.text
+    assert best.gain > SEPARATED_GAIN
+    assert best.rivals == (terms[0].name, terms[1].name)
+
+
 def test_a_term_of_a_rig_file_is_scaled_further(cessna: Rig) -> None:
     rig = cessna.changed({f"flight.terms.{CLP}": 0.5})
     effect = term(CLP, "ROLL")
@@ -123,13 +171,22 @@ def test_an_effect_of_a_part_that_the_model_lacks_is_not_tried(
     assert tried(cessna) - tried(own) == {"adverse_yaw"}
 
 
-def test_effects_of_lateral_motion_are_tried_where_it_moves(cessna: Rig) -> None:
-    alone = {"column": pulses(cessna, 12.0)["column"]}
-    record = motion_of(fly_force(noisy(cessna), alone, seed=3))
-    names = {effect.name for effect in prepare(cessna, {"r": record}).library}
+def test_effects_of_lateral_motion_are_tried_where_it_moves(cessna: Rig, worn: Record) -> None:
+    motion = motion_of(worn)
+    data = motion.data.copy()
+    at = [motion.channels.index(name) for name in LATERAL]
+    data[:, at] = np.random.default_rng(3).normal(0.0, 3e-4, (len(data), len(at)))
+    still = Record(motion.channels, data)
+    output = Output("airframe", "x", data[:, 0], lambda _: data[:, 0], 1.0, 120.0)
+    every = [*EFFECTS, term(CLP, "ROLL"), term("aero/coefficient/Cmq", "PITCH")]
+
+    def tried(record: Record) -> set[str]:
+        readers = readers_of(cessna, {"r": record}, "column")
+        return {effect.name for effect in tried_effects(every, readers, [output])}
+
     lateral = {effect.name for effect in AIRFRAME if effect.needs} - {"vertical_gust"}
-    assert len(lateral) == 10 and not names & lateral
-    assert names >= {"pitch_inertia", "drag", "center_of_gravity"}
+    assert len(lateral) == 10
+    assert tried(motion) - tried(still) == {*lateral, f"term {CLP}"}
 
 
 def test_terms_that_cannot_be_tried_are_refused(cessna: Rig, worn: Record, tmp_path: Path) -> None:

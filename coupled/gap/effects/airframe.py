@@ -14,6 +14,7 @@ from coupled.gap.signals.air import spread_of_air
 
 _ROLL, _YAW, _SLIP = "roll_rate_rad_per_s", "yaw_rate_rad_per_s", "sideslip_rad"
 TERM = "term"  # the name of an effect of a named function, in the JSON
+_NEEDS = {"ROLL": (_ROLL,), "YAW": (_YAW,), "SIDE": (_SLIP,), "Y": (_SLIP,)}
 _DRAWN = {
     "ROLL": Signature("roll_rate", "roll_left", "law", 4.0),
     "YAW": Signature("yaw_rate", "yaw_left", "law", 4.0),
@@ -75,7 +76,11 @@ AIRFRAME: tuple[Effect, ...] = (
 
 
 def term(function: str, axis: str) -> Effect:
-    """Return the effect of a factor on a named function of an axis of the model's aerodynamics."""
+    """Return the effect of a factor on a named function of an axis of the model's aerodynamics.
+
+    That of a lateral axis needs the motion of the axis.
+    """
     number = Parameter("factor", f"flight.{TERMS}{function}", "factor", 0.0, 10.0, (0.9,))
     drawn = _DRAWN.get(axis, Signature("alpha", "load_answer", "loop", 4.0))
-    return Effect(f"{TERM} {function}", "airframe", (number,), drawn, of=function)
+    needs = _NEEDS.get(axis, ())
+    return Effect(f"{TERM} {function}", "airframe", (number,), drawn, needs=needs, of=function)

@@ -27,7 +27,7 @@ from coupled.gap.signals.output import Output, white
 from coupled.gap.stages.airframe import airframe_outputs
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points
-from coupled.gap.thresholds import SEPARATED_GAIN, TEST_EDGE_s, TEST_s
+from coupled.gap.thresholds import PUSHED, SEPARATED_GAIN, TEST_EDGE_s, TEST_s
 from coupled.record.channels import ControlName, channel, noisy_channels
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
@@ -72,8 +72,8 @@ def next_tests(
     found = []
     pair = ((*others, rival.effect), (*others, step.effect))
     of_air = all(effect.stage == "airframe" for effects in pair for effect in effects)
-    # A fault of the aircraft may show in any of its motions.
-    pushed = [c for c in nominal.controls if of_air and channel(c, "force") in record]
+    # A fault of the aircraft may show in the motion by any control that the record moves.
+    pushed = [c for c in nominal.controls if of_air and _is_pushed(record, c)]
     for test in (test for c in pushed or [control] for test in pushes(nominal, record, c)):
         real = _as_flown(rival.fit.rig, test.rig, control).changed({"noise": noise})
         gain = _gain(test, real, control, pair, {**rival.fit.values, **choice.fit.values})
@@ -81,6 +81,12 @@ def next_tests(
             rivals = (step.effect.name, rival.effect.name)
             found.append(ProposedTest(test.text, rivals, gain))
     return tuple(sorted(found, key=lambda item: -item.gain))
+
+
+def _is_pushed(record: Record, control: ControlName) -> bool:
+    """Tell whether the force on a control is more than noise."""
+    force = channel(control, "force")
+    return force in record and float(np.std(record[force])) > PUSHED * white(record[force])
 
 
 def _as_flown(rig: Rig, test: Rig, control: ControlName) -> Rig:

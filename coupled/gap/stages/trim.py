@@ -25,6 +25,7 @@ from coupled.gap.signals.output import estimate_noise, memory, white
 from coupled.gap.stages.openloop import about, flown_in, fly_open_loop
 from coupled.gap.stages.surfaces import filed_trim, moved, own_trim, surface_channel, surface_points
 from coupled.gap.thresholds import (
+    FIRST_ROWS,
     TRIM_ANSWERED,
     TRIM_SIGMAS,
     TRIM_SINCE,
@@ -63,9 +64,10 @@ def trim_of(rig: Rig, record: Record, control: ControlName) -> Trim | None:
         return None
     own, noise, first = own_trim(rig, control), white(record[name]), float(record[name][0])
     off = _standing_off(rig, record, control)
-    if off is None:  # by the first row alone
-        at = own if abs(first - own) <= TRIM_SIGMAS * noise else first
-        return Trim(at, first, noise)
+    if off is None:  # by the rows before it moves
+        start, error = _at_rest(record[name][: max(2, round(TRIM_s * rig.frame_rate))], noise)
+        at = own if abs(start - own) <= TRIM_SIGMAS * error else start
+        return Trim(at, start, error)
     standing, error = off
     if abs(standing) <= TRIM_SIGMAS * error:
         return Trim(own, own + standing, error)
@@ -74,6 +76,13 @@ def trim_of(rig: Rig, record: Record, control: ControlName) -> Trim | None:
     flown = _followed(rig, record, control, own, there) if control == "column" else None
     in_trim = evidence > TRIM_SINCE if flown is None else evidence + flown > -TRIM_SINCE
     return Trim(there, there, error) if in_trim else Trim(own, own, noise, standing)
+
+
+def _at_rest(position: Floats, noise: float) -> tuple[float, float]:
+    """Return a surface's position before it moves by more than noise, and its standard error."""
+    moves = np.abs(position - position[:FIRST_ROWS].mean()) > TRIM_SIGMAS * noise
+    rows = max(1, int(np.argmax(moves))) if moves.any() else len(position)
+    return float(np.mean(position[:rows])), noise / math.sqrt(rows)
 
 
 def _standing_off(rig: Rig, record: Record, control: ControlName) -> tuple[float, float] | None:
