@@ -157,6 +157,7 @@ def test_an_effect_of_a_part_that_the_model_lacks_is_not_tried(
                     axis.remove(function)
 
     edited_model(tmp_path, "c172p", unyawed)
+    assert cessna.flight is not None
     flight = changed(cessna.flight, {"model_folder": str(tmp_path)}, "r", "flight")
     parts = parts_of(main_file(flight))
     assert "adverse_yaw" not in parts and "yaw_damping" in parts

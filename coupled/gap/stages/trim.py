@@ -17,6 +17,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
 from coupled.gap.noise.smooth import smoothed
@@ -65,7 +66,7 @@ def trim_of(rig: Rig, record: Record, control: ControlName) -> Trim | None:
     own, noise, first = own_trim(rig, control), white(record[name]), float(record[name][0])
     off = _standing_off(rig, record, control)
     if off is None:  # by the rows before it moves
-        start, error = _at_rest(record[name][: max(2, round(TRIM_s * rig.frame_rate))], noise)
+        start, error = _start_of(record[name][: max(2, round(TRIM_s * rig.frame_rate))], noise)
         at = own if abs(start - own) <= TRIM_SIGMAS * error else start
         return Trim(at, start, error)
     standing, error = off
@@ -78,11 +79,22 @@ def trim_of(rig: Rig, record: Record, control: ControlName) -> Trim | None:
     return Trim(there, there, error) if in_trim else Trim(own, own, noise, standing)
 
 
-def _at_rest(position: Floats, noise: float) -> tuple[float, float]:
-    """Return a surface's position before it moves by more than noise, and its standard error."""
+def _start_of(position: Floats, noise: float) -> tuple[float, float]:
+    """Return a surface's position in the first row, rad, and its standard error.
+
+    From the rows before it moves by more than noise: their mean, or the start of a parabola if that
+    improves the fit.
+    """
     moves = np.abs(position - position[:FIRST_ROWS].mean()) > TRIM_SIGMAS * noise
-    rows = max(1, int(np.argmax(moves))) if moves.any() else len(position)
-    return float(np.mean(position[:rows])), noise / math.sqrt(rows)
+    rows = int(np.argmax(moves)) if moves.any() else len(position)
+    if rows < FIRST_ROWS:
+        return float(position[0]), noise
+    seen, at = position[:rows], np.arange(rows)
+    mean, parabola = float(seen.mean()), Polynomial.fit(at, seen, 2)
+    gained = float(np.sum((seen - mean) ** 2 - (seen - parabola(at)) ** 2))
+    if gained < TRIM_ANSWERED * noise**2:
+        return mean, noise / math.sqrt(rows)
+    return float(parabola(0.0)), 3.0 * noise / math.sqrt(rows)  # of the end of a parabola
 
 
 def _standing_off(rig: Rig, record: Record, control: ControlName) -> tuple[float, float] | None:
