@@ -40,6 +40,7 @@ from tests.support.models import edited_model
 from tests.support.rigs import bench
 
 CLP = "aero/coefficient/Clp"
+SIZES = {"center_of_gravity": 0.08, "mass": 1.1, "lift_slope": 0.9}
 
 
 @pytest.fixture(scope="module")
@@ -252,20 +253,13 @@ def test_the_whole_diagnosis_names_it_alone_and_its_rig_closes_the_gap(
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [effect.name for effect in AIRFRAME if "gust" not in effect.name])
 def test_each_factor_is_named_at_its_size(cessna: Rig, name: str) -> None:
-    """By surfaces and motion alone; drag and thrust hardly show without the speed."""
+    """By surfaces and motion alone."""
     effect = BY_NAME[name]
     key = effect.value_key(effect.free[0])
-    value = 0.05 if name == "center_of_gravity" else 0.9
+    value = SIZES.get(name, 0.8)
     real = apply(noisy(cessna), "column", [effect], {key: value})
     record = fly_force(real, pulses(cessna), seed=3)
-    library = [one for one in AIRFRAME if "gust" not in one.name]
-    found = searched(cessna, record, library)
-    named = {step.effect.name for step in found.steps[:1]}
-    named |= {rival.effect.name for step in found.steps[:1] for rival in step.rivals}
-    if name in ("drag", "thrust"):
-        assert named <= {name}
-    else:
-        assert name in named
-        if found.fit.effects[0] is effect:
-            assert found.fit.low[key] < value < found.fit.high[key]
-    assert np.isfinite([*found.fit.values.values()]).all()
+    found = searched(cessna, record, [one for one in AIRFRAME if "gust" not in one.name])
+    (step,) = found.steps
+    assert step.effect.name == name and not step.rivals
+    assert found.fit.low[key] < value < found.fit.high[key]
