@@ -24,6 +24,7 @@ def diagnose(
     control: ControlName = "column",
     progress: Callable[[str, int, int], None] | None = None,
     healthy: Given | Sequence[Given] | Mapping[str, Given] | None = None,
+    terms: bool = False,
 ) -> Diagnosis:
     """Diagnose a mismatch between simulation and record: where, which effect, how large.
 
@@ -31,7 +32,9 @@ def diagnose(
     one; None for that of the manifest beside the records. Its aircraft is trimmed as the records
     begin. `records` is one record or several of that rig, as `Record`, as a DataFrame, as files, or
     by name; each needs `time_s` and what its stages need (force and deflections of the control, q̄).
-    `healthy` are records of the machine when it was well; what differs from those is judged.
+    `healthy` are records of the machine when it was well; what differs from those is judged. With
+    `terms`, the named functions of the model's aerodynamics are tried in place of the effects that
+    scale its aerodynamics: the effect `term NAME` is a factor on the function NAME.
 
     `found.verdict` is `no_gap`, `effect`, `mostly`, `ambiguous` or `unexplained`;
     `found.effects` are the effects, each with its parameters, their values and 95 % intervals;
@@ -53,7 +56,7 @@ def diagnose(
     named = named_records(records)
     nominal = rig_of_manifests(named) if rig is None else rig_given(rig)
     well = None if healthy is None else named_records(healthy)
-    return diagnose_records(nominal, named, control, progress, well)
+    return diagnose_records(nominal, named, control, progress, well, terms=terms)
 
 
 @public

@@ -61,6 +61,12 @@ def diagnose(
         Path | None,
         typer.Option(metavar="DIR", help="Draw the figures ladder, stages and signature there."),
     ] = None,
+    terms: Annotated[
+        bool,
+        typer.Option(
+            "--terms", help="Try a factor on each named aerodynamic function of the model."
+        ),
+    ] = False,
     power: Annotated[
         bool, typer.Option("--power", help="Say what size of each effect would have shown.")
     ] = False,
@@ -89,6 +95,7 @@ def diagnose(
     name = control_named(control, records[0])
     if any(record.is_dir() for record in records):
         asked = {"--improve": improve, "--plots": plots, "--power": power, "--healthy": healthy}
+        asked["--terms"] = terms
         _refuse_for_folders(records, asked | {"--json": json_file, "--report": report})
         _diagnose_folder(records, rig, output, name, check_cluster(workers, cluster))
         return
@@ -107,7 +114,7 @@ def diagnose(
         raise InputError(plots or "", "--plots", f"would write {improve}, as does --improve")
     targets += check_report(report, [*inputs, *targets], plots)
     check_json(json_file, [*inputs, *targets])
-    whole, read = _diagnose(records, rig_file, name, healthy or [])
+    whole, read = _diagnose(records, rig_file, name, healthy or [], terms)
     note = say_guesses(whole.nominal, (name,))
     worse = improve is not None and not whole.improves
     table = whole.as_dict(power) if json_file else {}
@@ -136,7 +143,11 @@ def _refuse_for_folders(records: list[Path], asked: dict[str, object]) -> None:
 
 
 def _diagnose(
-    files: list[Path], rig_file: Path | None, control: ControlName, healthy: list[Path]
+    files: list[Path],
+    rig_file: Path | None,
+    control: ControlName,
+    healthy: list[Path],
+    terms: bool,
 ) -> tuple[Diagnosis, dict[str, Record]]:
     from coupled.gap.diagnose import diagnose as find_gap
     from coupled.gap.trimmed import rig_of_manifests
@@ -147,7 +158,7 @@ def _diagnose(
     well = {str(file): read.pop(str(file)) for file in healthy}
     nominal = rig_of_manifests(read) if nominal is None else nominal
     with progress() as advance:
-        whole = find_gap(nominal, read, control, advance, well)
+        whole = find_gap(nominal, read, control, advance, well, terms=terms)
         advance("flying again, and looking for the next test", 0, 1)
         _ = whole.closed_loop, whole.in_flight, whole.next_tests  # here, where progress is shown
     return whole, read

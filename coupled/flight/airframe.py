@@ -109,6 +109,37 @@ def packaged_models() -> Mapping[str, Path]:
     return models_in(Path(jsbsim.get_default_root_dir()) / "aircraft")
 
 
+def main_file(flight: Flight, models: Sequence[Path] = (), file: object = "rig") -> Path:
+    """Return the main file of a rig's model.
+
+    `models` are folders of our own models, searched first. Raises InputError, with `file`.
+    """
+    name, known = flight.model, dict(packaged_models())
+    for folder in reversed(models):
+        known |= models_in(folder)
+    if flight.folder:
+        known[name] = _own_folder(flight, file)
+    if name not in known:
+        problem = f"there is no JSBSim model {name!r}; {nearest(name, known)}"
+        raise InputError(file, "flight.model", problem)
+    main = known[name] / flight.main_file
+    if not main.is_file():
+        raise InputError(file, "flight.model_file", f"there is no {flight.main_file} of JSBSim")
+    return main
+
+
+def _own_folder(flight: Flight, file: object) -> Path:
+    """Return the folder of the rig's own model."""
+    folder = Path(flight.folder)
+    try:
+        there = (folder / flight.main_file).is_file()
+    except (OSError, ValueError):  # a name that no folder can have
+        there = False
+    if not there:
+        raise InputError(file, "flight.model_folder", f"holds no {flight.main_file}")
+    return folder
+
+
 class JSBSimAirframe:
     """A JSBSim model, trimmed at the rig's altitude, calibrated airspeed and flight path.
 
@@ -172,7 +203,7 @@ class JSBSimAirframe:
     ) -> Any:
         _base().debug_lvl = 0
         jsbsim.set_logger(_log)
-        name, main = self._flight.model, self._main_file(models)
+        name, main = self._flight.model, main_file(self._flight, models, self._file)
         fdm = jsbsim.FGFDMExec(jsbsim.get_default_root_dir())
         step_s = frame_s / self._flight.steps_per_frame
         fdm.set_dt(step_s)  # before loading, for the model's rate limits
@@ -217,20 +248,6 @@ class JSBSimAirframe:
             return self._load(models, frame_s, wrappers, created | wanted)
         return fdm
 
-    def _main_file(self, models: Sequence[Path]) -> Path:
-        """Return the model's main file."""
-        name, known = self._flight.model, dict(packaged_models())
-        for folder in reversed(models):
-            known |= models_in(folder)
-        if self._flight.folder:
-            known[name] = self._own_folder()
-        if name not in known:
-            raise self.fault("model", f"there is no JSBSim model {name!r}; {nearest(name, known)}")
-        main = known[name] / self._flight.main_file
-        if not main.is_file():
-            raise self.fault("model_file", f"there is no {self._flight.main_file} of JSBSim")
-        return main
-
     def _unmade(self) -> InputError | None:
         """Return the fault of a model that reads properties which nothing creates, if it does."""
         names = sorted(properties_read(self._main) - self._catalog.keys())
@@ -242,17 +259,6 @@ class JSBSimAirframe:
             f" does: {listed(names[:LISTED])}{more}; give each a value here"
         )
         return self.fault("properties", problem)
-
-    def _own_folder(self) -> Path:
-        """Return the folder of the rig's own model."""
-        folder = Path(self._flight.folder)
-        try:
-            there = (folder / self._flight.main_file).is_file()
-        except (OSError, ValueError):  # a name that no folder can have
-            there = False
-        if not there:
-            raise self.fault("model_folder", f"holds no {self._flight.main_file}")
-        return folder
 
     def _set(self, name: str, value: float) -> None:
         """Set a property named by the rig file, if it exists and may be set."""

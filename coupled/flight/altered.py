@@ -22,7 +22,10 @@ stays a moment, by whatever function the model uses, without side effects.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -30,7 +33,8 @@ from numpy.typing import NDArray
 
 from coupled.flight.everyframe import TRIMS
 from coupled.flight.loading import INERTIAS
-from coupled.flight.modelparts import Part, Scaled, Term, Thrust, Whole
+from coupled.flight.modelparts import NothingToScaleError, Part, Scaled, Term, Thrust, Whole
+from coupled.flight.modeltext import ModelText
 from coupled.flight.wrapper import Aircraft, Hook, Wrapper, together
 from coupled.record.channels import ControlName
 from coupled.rig.parameters import Flight
@@ -117,6 +121,26 @@ def alterations(flight: Flight) -> list[Altered]:
     terms = [Altered(Term(name), factor, None) for name, factor in flight.terms.items()]
     others = [Altered(a.part, getattr(flight, a.part.name), a.about_trim) for a in ALTERATIONS]
     return [*terms, *(each for each in others if each.factor != 1.0)]
+
+
+def parts_of(main: Path) -> frozenset[str]:
+    """Return the keys of the parts that a model has, of those that a factor scales.
+
+    `main` is its main file. Raises UnreadableModelError for a file that is not XML.
+    """
+    state = main.stat()
+    return _parts_of(main, state.st_mtime_ns, state.st_size)
+
+
+@lru_cache(maxsize=16)
+def _parts_of(main: Path, changed_ns: int, size: int) -> frozenset[str]:
+    """Return the same; the time of change and the size key the cache."""
+    found = set[str]()
+    for part in (alteration.part for alteration in ALTERATIONS):
+        with suppress(NothingToScaleError):
+            part.make_scalable(ModelText.of(main))
+            found.add(part.name)
+    return frozenset(found)
 
 
 class Alterations(Wrapper):

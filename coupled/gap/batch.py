@@ -124,7 +124,10 @@ class Row:
             verdict=kept.verdict,
             effects=tuple(effect.name for effect in kept.effects),
             parameters=tuple(
-                (name, one.value) for e in kept.effects for name, one in e.parameters.items()
+                (name, one.value)
+                for e in kept.effects
+                for name, one in e.parameters.items()
+                if not isinstance(one.value, str)
             ),
             guilty=tuple(name for name, stage in kept.stages.items() if stage.guilty),
             rivals=tuple(tuple(group) for group in kept.rivals),

@@ -43,21 +43,23 @@ def diagnose(
     tell: Tell | None = None,
     healthy: Mapping[str, Record] | None = None,
     workers: int = 0,
+    terms: bool = False,
 ) -> Diagnosis:
     """Return the diagnosis of records of one rig, by their files' names.
 
     `tell` is called with the present task, and the numbers of tasks done and in all. With records
     of the `healthy` machine, the change since then is judged. `workers` is the number of threads, 0
-    for one per core; the result does not depend on it. Raises InputError if a record cannot be of
-    this rig, or if no stage can be judged.
+    for one per core; the result does not depend on it. With `terms`, the named functions of the
+    model's aerodynamics are tried. Raises InputError if a record cannot be of this rig, or if no
+    stage can be judged.
     """
     with threads(workers):
         baseline = None
         if healthy:
-            well = prepare(rig, healthy, control, tell)
+            well = prepare(rig, healthy, control, tell, terms=terms)
             case, found = search(well.case, well.library)
             baseline = Baseline.of(well.records, case, found.fit)
-        prepared = prepare(rig, records, control, tell, baseline)
+        prepared = prepare(rig, records, control, tell, baseline, terms)
         return findings(prepared, *search(prepared.case, prepared.library))
 
 

@@ -26,6 +26,7 @@ from coupled.gap.stages.alone import AloneReader, at_rate_of, check_moved_by_pil
 from coupled.gap.stages.shots import not_judged
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points
+from coupled.gap.stages.terms import with_terms
 from coupled.gap.stages.tried import tried_effects
 from coupled.gap.thresholds import RIGS_KEPT
 from coupled.gap.trimmed import trim_speed, trimmed
@@ -59,9 +60,11 @@ def prepare(
     control: ControlName = "column",
     tell: Tell | None = None,
     baseline: Baseline | None = None,
+    terms: bool = False,
 ) -> Prepared:
     """Return records prepared for a diagnosis, by their files' names.
 
+    With `terms`, the named functions of the model's aerodynamics are tried (`stages.terms`).
     With a `baseline`, the rig is that of the healthy machine, and its model error raises the noise
     floors. Raises InputError if a record cannot be of this rig, or if no stage can be judged.
     """
@@ -91,7 +94,10 @@ def prepare(
     left_out = [words for one in live for words in one.left_out]
     if any(output.stage == "airframe" for output in outputs):
         left_out += [words for words in [not_judged(list(records.values()))] if words]
-    library = tried_effects(library_of(rig, control), judged.readers, outputs)
+    library = library_of(rig, control)
+    library = tried_effects(
+        with_terms(library, rig, records) if terms else library, judged.readers, outputs
+    )
     return Prepared(
         Case(rig, control, outputs, tell, judged.under, model_error_in_floors=baseline is not None),
         tuple(library),

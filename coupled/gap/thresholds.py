@@ -127,6 +127,7 @@ SURFACE_MOVES_rad = 1e-4  # chosen: above which the aircraft moves a surface its
 SURFACE_GUST_m_per_s = 3.0  # chosen: upward gust during this test
 SAME_TRIM_rad = 1e-9  # chosen: largest difference of two trims of one model
 TRIM_s = 1.0  # chosen: from a record's start, over which the trim is measured
+FIRST_ROWS = 12  # chosen: least rows before a surface moves, by which its trim is measured
 TRIM_SIGMAS = 4.0  # chosen: of its noise, above which a record's trim differs from the model's
 TRIM_STILL = 0.25  # chosen: of the difference, the largest earlier motion by a command
 TRIM_ANSWERED = 13.8  # χ² of two parameters, exceeded by chance in 1 of 1000
@@ -134,6 +135,8 @@ TRIM_ANSWERED = 13.8  # χ² of two parameters, exceeded by chance in 1 of 1000
 TRIM_FLIGHT_s = 15.0  # T-37 with one fault or two; longer, the phugoid's own error decided
 TRIM_LAGS_s = (0.0, 0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 1.0, 1.3, 1.7, 2.2, 3.0, 4.0)  # chosen
 TRIM_SINCE = 4.0  # chosen: least gain, twice the log-likelihood, for a motion since then
+LATERAL_MOVES = 1.5  # chosen: rms over noise of a lateral channel, above which it moves
+TERM_LEAST = 0.01  # the contract's: share of its axis from which a model's function is freed
 UNTRIMMED = 1e3  # chosen: noise floors: the residual of an aircraft that does not trim
 LOST_MOTION = 20.0  # rad/s of pitch rate, above which an open-loop flight is lost; chosen
 STIFFEST_AIR = 1e12  # frames⁴: largest weight for which the banded equations are well conditioned
@@ -269,6 +272,7 @@ SETTING_NUDGE = 0.5  # chosen: of a setting's tolerance, at which its signature 
 
 # The next test (`proposal`), and the flight again (`flown`).
 TEST_s, TEST_EDGE_s = 15.0, 0.25  # chosen: of a test, and in which a hand begins or ends a push
+PUSHED = 2.0  # chosen: rms of a force over its noise, above which a control is pushed
 SEPARATED_GAIN = 10.0  # chosen: log-likelihood gain that discriminates two effects
 SAME_FLIGHT = 0.01  # chosen: of the mean logarithm, by which an improved rig may fly further off
 PROFILE_EVERY = 12  # chosen: frames between the points of a bench's q̄

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -214,6 +215,20 @@ def _other_force(scene: Scene) -> Floats:
     raise KeyError("force on another control")
 
 
+def _about_trim(scene: Scene, surface: str) -> Floats:
+    """Return a surface's position from where the record begins, °."""
+    position = scene.smooth(surface)
+    return np.asarray((position - position[0]) / DEGREE_rad)
+
+
+def _in_degrees(name: str, scene: Scene, rig: Rig | None) -> Floats:
+    return scene.seen(name, rig) / DEGREE_rad
+
+
+def _left_in_degrees(axis: str, scene: Scene, rig: Rig | None) -> Floats:
+    return _against_base(f"{axis}_rate_rad_per_s")(scene, rig) / DEGREE_rad
+
+
 def _noise(scene: Scene, rig: Rig | None) -> Floats:
     read = scene.recorded("computed")
     return 1000.0 * scene.fine * (read - smoothed(read))
@@ -262,20 +277,25 @@ SIGNALS: dict[str, Signal] = {
         "rate of the surface's answer", "%/s", lambda s, r: s.rate(smoothed(_answer(s, r)))
     ),
     "ratio": Signal("surface's answer over its command", "1", _ratio),
-    "elevator": Signal(
-        "elevator about trim",
-        "°",
-        lambda s, r: (s.smooth("elevator_rad") - s.smooth("elevator_rad")[0]) / DEGREE_rad,
-    ),
-    "pitch_rate": Signal(
-        "pitch rate", "°/s", lambda s, r: s.seen("pitch_rate_rad_per_s", r) / DEGREE_rad
-    ),
-    "pitch_left": Signal(
-        "pitch rate beyond the model's",
-        "°/s",
-        lambda s, r: _against_base("pitch_rate_rad_per_s")(s, r) / DEGREE_rad,
-    ),
-    "alpha": Signal("angle of attack", "°", lambda s, r: s.seen("alpha_rad", r) / DEGREE_rad),
+    "elevator": Signal("elevator about trim", "°", lambda s, r: _about_trim(s, "elevator_rad")),
+    "aileron": Signal("aileron about trim", "°", lambda s, r: _about_trim(s, "aileron_rad")),
+    "rudder": Signal("rudder about trim", "°", lambda s, r: _about_trim(s, "rudder_rad")),
+    **{
+        name: Signal(words, unit, partial(_in_degrees, channel))
+        for name, words, unit, channel in (
+            ("pitch_rate", "pitch rate", "°/s", "pitch_rate_rad_per_s"),
+            ("roll_rate", "roll rate", "°/s", "roll_rate_rad_per_s"),
+            ("yaw_rate", "yaw rate", "°/s", "yaw_rate_rad_per_s"),
+            ("alpha", "angle of attack", "°", "alpha_rad"),
+            ("sideslip", "sideslip", "°", "sideslip_rad"),
+        )
+    },
+    **{
+        f"{axis}_left": Signal(
+            f"{axis} rate beyond the model's", "°/s", partial(_left_in_degrees, axis)
+        )
+        for axis in ("pitch", "roll", "yaw")
+    },
     "load_answer": Signal("load factor", "g", lambda s, r: s.seen("load_factor", r)),
     "air": Signal("rise of the air", "m/s", _air),
 }

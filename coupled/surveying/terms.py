@@ -115,7 +115,7 @@ def list_terms(
     else:
         flight, values = _flown_by_run(chosen, fspath(run), axes)
         flown = f"the run {fspath(run)}"
-    return ModelTerms(chosen.label, flight, flown, tuple(_shares(axes, values)))
+    return ModelTerms(chosen.label, flight, flown, tuple(shares(axes, values)))
 
 
 def _silent(said: str, done: int, whole: int) -> None:
@@ -167,7 +167,7 @@ def _flown_by_run(model: ModelFile, run: str, terms: Iterable[str]) -> tuple[Fli
     return flight, {term: record[term] for term in known}
 
 
-def _shares(axes: Mapping[str, str], values: Values) -> Iterator[AeroTerm]:
+def shares(axes: Mapping[str, str], values: Values) -> Iterator[AeroTerm]:
     """Yield the terms by axis, the largest share first; those of no axis are last."""
     sizes = {term: float(np.sqrt(np.mean(np.square(each)))) for term, each in values.items()}
     whole = dict.fromkeys(axes.values(), 0.0)

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from coupled.calibration.documentation import check_feel
+from coupled.gap.effects.airframe import AIRFRAME
 from coupled.gap.effects.effect import apply
 from coupled.gap.effects.library import BY_NAME
 from coupled.rig.rig import Rig
@@ -64,12 +65,7 @@ FAULTS: dict[str, dict[str, float]] = {
 UNSEEN = {
     "pressure_lag": "q̄ is constant",
     "bob_weight": "the aircraft does not move",
-    "elevator_effectiveness": "the aircraft does not move",
-    "pitch_damping": "the aircraft does not move",
-    "pitch_stiffness": "the aircraft does not move",
-    "lift_slope": "the aircraft does not move",
-    "mass": "the aircraft does not move",
-    "vertical_gust": "the aircraft does not move",
+    **{one.name: "the aircraft does not move" for one in AIRFRAME},
     "surface_lag": "sweeps are slow",
     "surface_rate_limit": "sweeps are slow",
     "transport_delay": "timing starts at the release's own 90 %",

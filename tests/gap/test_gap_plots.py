@@ -16,6 +16,7 @@ from coupled.gap.diagnose import diagnose
 from coupled.gap.effects.effect import Effect, apply
 from coupled.gap.effects.library import BY_NAME, EFFECTS
 from coupled.gap.findings.diagnosis import Diagnosis
+from coupled.gap.findings.flown import fly_force
 from coupled.gap.findings.result import EffectResult, ParameterEstimate, StageResult
 from coupled.gap.findings.shrink import ChannelShrink, Shrink
 from coupled.gap.search.found import Candidate, Choice, Fit, Found
@@ -28,8 +29,12 @@ from coupled.plots.gapview import View, channel_label, channel_shown
 from coupled.plots.saving import save
 from coupled.plots.signals import SIGNALS
 from coupled.plots.signatures import draw_signature
+from coupled.record.channels import LATERAL
 from coupled.record.record import Record, write_record
+from coupled.resources import shipped_rigs
 from coupled.rig.rig import Rig
+from coupled.rig.rigfile import read_rig
+from tests.support.airframes import noisy, pulses
 from tests.support.commands import coupled
 from tests.support.gaps import made, nominal_rig
 
@@ -43,6 +48,15 @@ UNIT = re.compile(rf", ({UNITS})( \(logarithmic\))?$")
 def cases(tmp_path_factory: pytest.TempPathFactory) -> Mapping[bool, Case]:
     """A bench and a flight of 12 s without any effect, with their outputs, by whether flown."""
     return {flown: case(tmp_path_factory.mktemp("r"), flown) for flown in (False, True)}
+
+
+@pytest.fixture(scope="module")
+def lateral() -> Case:
+    """A flight of 12 s with all three controls, and its outputs."""
+    rig = read_rig(shipped_rigs()["c172p"])
+    record = fly_force(noisy(rig), pulses(rig, 12.0), seed=3)
+    reader = Reader(rig, record, "column", surface_points)
+    return rig, record, (*reader.outputs(), *airframe_outputs(rig, record))
 
 
 def case(folder: Path, flown: bool) -> Case:
@@ -111,9 +125,9 @@ def labels(figure: Figure) -> list[str]:
 
 @pytest.mark.parametrize("effect", EFFECTS, ids=lambda effect: effect.name)
 def test_every_effect_has_a_signature_with_units(
-    cases: Mapping[bool, Case], effect: Effect
+    cases: Mapping[bool, Case], lateral: Case, effect: Effect
 ) -> None:
-    case = cases[needs_flight(effect)]
+    case = lateral if {*LATERAL} & {*effect.needs} else cases[needs_flight(effect)]
     figure = draw_signature(View(diagnosis_of(case, [effect])))
     figure.draw_without_rendering()
     assert effect.name.replace("_", " ") in figure.subfigs[0].get_suptitle()

@@ -11,25 +11,15 @@ from coupled.gap.effects.effect import apply
 from coupled.gap.effects.library import BY_NAME
 from coupled.gap.findings.flown import closed_loop, fly_force
 from coupled.gap.stages.surfaces import surface_points
-from coupled.record.channels import ControlName, noisy_channels
+from coupled.record.channels import ControlName
 from coupled.record.record import Record
 from coupled.resources import aircraft_folder
 from coupled.rig.rig import Rig
 from coupled.rig.rigfile import read_rig
+from tests.support.airframes import noisy
 
 PUSH_N = {"column": 40.0, "wheel": 25.0, "pedals": 80.0}
 LONG_s = 30.0
-# Standard deviations of white noise by the end of a channel's name.
-NOISE = {"_N": 0.1, "_m": 5e-5, "_Pa": 10.0, "_rad": 3e-4, "_s": 3e-4, "factor": 3e-3}
-OF_THE_AIR = {"true_airspeed_m_per_s": 0.1, "altitude_m": 0.3, "wheel_deflection_rad": 1e-3}
-
-
-def noisy(rig: Rig) -> Rig:
-    levels = {
-        name: OF_THE_AIR.get(name, next(v for end, v in NOISE.items() if name.endswith(end)))
-        for name in noisy_channels(list(rig.controls), flown=True)
-    }
-    return rig.changed({"noise": levels})
 
 
 def pushes(rig: Rig, **size_N: float) -> dict[ControlName, NDArray[np.float64]]:

@@ -15,7 +15,7 @@ from coupled.gap.effects.effect import apply
 from coupled.gap.effects.library import BY_NAME
 from coupled.gap.search.case import Case
 from coupled.gap.search.problem import Problem
-from coupled.gap.signals.output import Output
+from coupled.gap.signals.output import Output, white
 from coupled.gap.stages.airframe import TRIM, airframe_outputs
 from coupled.gap.stages.openloop import Moved, about, command_of, fly_open_loop
 from coupled.gap.stages.surfaces import own_trim, surface_points
@@ -134,13 +134,21 @@ def test_the_trim_is_an_output_that_the_right_model_meets(tmp_path: Path, rig: R
     assert np.all(output.predict(heavy) == aircraft.motion()[ELEVATOR])
 
 
-def test_without_the_command_the_first_row_tells(tmp_path: Path, rig: Rig) -> None:
+def test_without_the_command_the_first_rows_show_the_trim(tmp_path: Path, rig: Rig) -> None:
     whole = made(tmp_path, rig, {"mass": {"factor": 1.1}}, 4)
     kept = [i for i, name in enumerate(whole.channels) if name != "column_estimate_m"]
     record = Record(tuple(whole.channels[i] for i in kept), whole.data[:, kept])
     found = trim_of(rig, record, "column")
     assert found is not None
-    assert found.position == record["elevator_rad"][0]
+    assert found.position == found.measured
+    assert abs(found.position - own_trim(real(rig, "mass", 1.1), "column")) < 4.0 * found.error
+    assert found.error < 0.9 * white(record["elevator_rad"])
+    at = record.channels.index("elevator_rad")
+    moving = record.data.copy()
+    moving[:, at] += 0.05 * record.time_s  # it moves from the start
+    found = trim_of(rig, Record(record.channels, moving), "column")
+    assert found is not None
+    assert abs(found.position - own_trim(real(rig, "mass", 1.1), "column")) < 4.0 * found.error
 
 
 def test_without_motion_a_small_offset_is_the_surfaces(tmp_path: Path, rig: Rig) -> None:

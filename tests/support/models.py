@@ -36,3 +36,18 @@ def multiplied(factors: Mapping[str, float]) -> Callable[[ET.Element], None]:
             ET.SubElement(product, "value").text = repr(factor)
 
     return edit
+
+
+def scaled_term(name: str, factor: float) -> Callable[[ET.Element], None]:
+    """Return an edit that multiplies the one function of a name, whatever its form."""
+
+    def edit(aerodynamics: ET.Element) -> None:
+        (function,) = (f for f in aerodynamics.iter("function") if f.get("name") == name)
+        inside = [part for part in function if part.tag != "description"]
+        for part in inside:
+            function.remove(part)
+        product = ET.SubElement(function, "product")
+        ET.SubElement(product, "value").text = repr(factor)
+        product.extend(inside)
+
+    return edit

@@ -77,6 +77,8 @@ class Parameter:
 
     def unit(self, rig: Rig, control: ControlName) -> str:
         """Return the unit of the rig's value in text, such as N·s/m."""
+        if TERMS in self.key:
+            return ""
         last = self.key_on(control).rpartition(".")[2]
         unit = last.removeprefix(field_of(rig, control, self.key)).lstrip("_")
         over, _, under = unit.partition("per_")
@@ -137,6 +139,7 @@ class Signature:
 
 
 OTHER_FORCE = "another control's force"
+TERMS = "terms."  # before the name of an aerodynamic function, in keys of the flight
 
 
 class Sampled(NamedTuple):
@@ -162,6 +165,7 @@ class Effect:
     `seen`         returns start values by parameter, estimated from the residuals
     `of_sensor`    it acts in the sensor of δc, which a set point does not have
     `contains`     names of the laws nested in it
+    `of`           the aerodynamic function that it scales; empty for an effect of the library
     """
 
     name: str
@@ -175,6 +179,7 @@ class Effect:
     seen: Callable[[Sequence[Output], Rig, ControlName], list[dict[str, float]]] | None = None
     of_sensor: bool = False
     contains: tuple[str, ...] = ()
+    of: str = ""
 
     @property
     def free(self) -> tuple[Parameter, ...]:
@@ -210,6 +215,9 @@ def _fields(section: type[Section], d: str) -> dict[str, str]:
 def value_of(rig: Rig, control: ControlName, key: str) -> Any:
     """Return a rig's value of a key of a control, or of the flight."""
     section, _, last = key.partition(".")
+    if section == "flight" and last.startswith(TERMS):
+        assert rig.flight is not None
+        return rig.flight.terms.get(last.removeprefix(TERMS), 1.0)
     holder = rig.flight if section == "flight" else getattr(rig.controls[control], section)
     return getattr(holder, field_of(rig, control, key)) if last else holder
 

@@ -9,13 +9,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from coupled.gap.effects.effect import Effect, Sampled
+from coupled.gap.effects.airframe import AIRFRAME
+from coupled.gap.effects.effect import Effect
 from coupled.gap.effects.entries import added, factor, limit, one, setting_of, value
 from coupled.gap.effects.linkage import LINKAGE, without_servo
 from coupled.gap.effects.loader import LOADER
 from coupled.gap.effects.sensing import COMPENSATION, SENSING
-from coupled.gap.signals.air import NEEDS as AIR
-from coupled.gap.signals.air import spread_of_air
 from coupled.record.channels import ControlName
 from coupled.rig.rig import Rig
 
@@ -72,46 +71,7 @@ EFFECTS: tuple[Effect, ...] = (
         replace(added("play_norm", "rigging.play_norm", 0, 0.5, 0.01), saturates=True),
         *("wanted", "answer_left", "loop"),
     ),
-    one(
-        "airframe",
-        "elevator_effectiveness",
-        factor("flight.elevator_effectiveness", 0.9),
-        *("elevator", "pitch_rate", "loop", 4.0),
-    ),
-    one(
-        "airframe",
-        "pitch_damping",
-        factor("flight.pitch_damping", 1.2),
-        *("pitch_rate", "pitch_left", "law", 4.0),
-    ),
-    one(
-        "airframe",
-        "pitch_stiffness",
-        factor("flight.pitch_stiffness", 1.1),
-        *("alpha", "pitch_rate", "loop", 4.0),
-    ),
-    one(
-        "airframe",
-        "lift_slope",
-        factor("flight.lift_slope", 0.97, 0.2, 5.0),
-        *("alpha", "load_answer", "loop", 4.0),
-    ),
-    one(
-        "airframe",
-        "mass",
-        factor("flight.mass", 1.03, 0.3, 3.0),
-        *("alpha", "load_answer", "loop", 4.0),
-    ),
-    replace(
-        one(
-            "airframe",
-            "vertical_gust",
-            value("rms_m_per_s", "flight.gust_rms_m_per_s", 0, 30, 0.5),
-            *("", "air", "time", 6.0),
-        ),
-        needs=AIR,
-        sampled=Sampled(spread_of_air),
-    ),
+    *AIRFRAME,
     one(
         "surface",
         "rigging_offset",

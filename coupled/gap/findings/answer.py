@@ -155,7 +155,8 @@ def effects_of(
         most = STATED_MOST if has_size(effect, case, numbers) else UNDETERMINED_MOST
         probability = min(step.probability * sure, most)
         course = course_in(effect, case, choice.fit, records)
-        return EffectResult(effect.name, effect.stage, probability, numbers, known, course)
+        given = (effect.name, effect.stage, probability, numbers, known, course)
+        return EffectResult(*given, of=effect.of)
 
     return tuple(result(step) for step in sorted(choice.steps, key=lambda s: -s.gain))
 

@@ -19,7 +19,7 @@ AnyVerdict = Literal["no_gap", "effect", "mostly", "ambiguous", "unexplained", "
 class KeptParameter(Lenient):
     """A parameter of an effect, SI; a bound of its 95 % interval is None if it is open."""
 
-    value: float | None = None
+    value: float | str | None = None
     low: float | None = None
     high: float | None = None
 

@@ -152,7 +152,7 @@ def closed_loop(
         return None
     names = [channel(control, quantity) for quantity in COMPARED]
     surface = surface_channel(control)
-    motion = [surface, *MOTION, *(() if control == "column" else LATERAL)]
+    motion = [surface, *MOTION, *LATERAL]
     motion = motion if nominal.flight is not None else []
     names = [name for name in (*names, *motion) if name in record]
     before, after = (_differences(again, rig, names) for rig in (nominal, improved))

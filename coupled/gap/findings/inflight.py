@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from coupled.display import percent
 from coupled.gap.findings.flown import Again
 from coupled.gap.findings.shapley import shapley_weights
+from coupled.gap.findings.summary import plain
 from coupled.gap.search.case import Case
 from coupled.gap.search.found import Fit
 from coupled.gap.stages.surfaces import surface_channel
@@ -27,7 +28,7 @@ from coupled.rig.rig import Rig
 
 Floats = NDArray[np.float64]
 LOAD = "load_factor"
-RATES = {
+RATES: Mapping[ControlName, tuple[str, ...]] = {
     "column": ("pitch_rate_rad_per_s", LOAD),
     "wheel": ("roll_rate_rad_per_s",),
     "pedals": ("yaw_rate_rad_per_s",),
@@ -83,7 +84,10 @@ def in_flight(
         if flown is None:
             return None
         flights.append(flown)
-    names = [name for name in (*RATES[control], surface_channel(control)) if name in flights[-1]]
+    of_air = any(effect.stage == "airframe" for effect in found.effects)
+    turns = RATES if of_air else [control]
+    wanted = [*(rate for name in turns for rate in RATES[name]), surface_channel(control)]
+    names = [name for name in wanted if name in flights[-1]]
     rows = min(len(flown) for flown in flights)
     whole = np.array([flights[-1][name][:rows] for name in names])
     each = np.array([[flown[name][:rows] for name in names] for flown in flights])
@@ -127,8 +131,8 @@ def in_words(effects: Sequence[EffectInFlight]) -> str:
         (only,) = effects
         parts = [f"the {_plain(n)} by {_per_cent(v)}" for n, v in only.of_motion.items()]
         return f"In flight it changes {_listed(parts)} of their rms."
-    parts = [f"{e.name.replace('_', ' ')} {_per_cent(e.share)}" for e in effects]
-    first = effects[0].name.replace("_", " ")
+    parts = [f"{plain(e.name)} {_per_cent(e.share)}" for e in effects]
+    first = plain(effects[0].name)
     return f"Shares of the change in flight: {_listed(parts)}. Correct {first} first."
 
 

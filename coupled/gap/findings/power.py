@@ -15,10 +15,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.gap.effects.effect import Effect, Parameter, apply, possible, touched, value_of
+from coupled.gap.effects.effect import (
+    Effect,
+    Parameter,
+    apply,
+    keys_of,
+    possible,
+    touched,
+    value_of,
+)
 from coupled.gap.effects.library import EFFECTS
 from coupled.gap.effects.settings import contact, settings
 from coupled.gap.signals.output import Output
+from coupled.gap.stages.tried import lacking_keys
 from coupled.gap.thresholds import POWER_DECADES, POWER_HALVINGS, SETTING_NUDGE
 from coupled.record.channels import ControlName
 from coupled.rig.rig import Rig
@@ -56,7 +65,12 @@ def power(
     library: Sequence[Effect] = EFFECTS,
 ) -> tuple[EffectPower, ...]:
     """Return the smallest detectable size of each effect."""
-    return tuple(_power(nominal, control, touched(outputs, [one]), one) for one in library)
+    lacking = lacking_keys(nominal)
+
+    def judging(effect: Effect) -> list[Output]:
+        return [] if lacking & keys_of([effect]) else touched(outputs, [effect])
+
+    return tuple(_power(nominal, control, judging(one), one) for one in library)
 
 
 def _power(

@@ -18,6 +18,7 @@ from coupled.errors import InputError
 from coupled.gap.effects.effect import Effect, value_of
 from coupled.gap.effects.library import EFFECTS
 from coupled.gap.findings.flown import fly_force
+from coupled.gap.findings.summary import plain
 from coupled.gap.search.case import Case
 from coupled.gap.search.evidence import likelier_by
 from coupled.gap.search.found import Choice
@@ -26,7 +27,7 @@ from coupled.gap.signals.output import Output, white
 from coupled.gap.stages.airframe import airframe_outputs
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points
-from coupled.gap.thresholds import SEPARATED_GAIN, TEST_EDGE_s, TEST_s
+from coupled.gap.thresholds import PUSHED, SEPARATED_GAIN, TEST_EDGE_s, TEST_s
 from coupled.record.channels import ControlName, channel, noisy_channels
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
@@ -49,12 +50,13 @@ class ProposedTest:
 
 @dataclass(frozen=True)
 class Push:
-    """A possible test: its description, its force and q̄ at each frame, and its rig."""
+    """A possible test: its description, its force and q̄ at each frame, its control and rig."""
 
     text: str
     force_N: Floats
     pressure_Pa: Floats
     rig: Rig
+    control: ControlName
 
 
 def next_tests(
@@ -66,11 +68,14 @@ def next_tests(
         return ()
     rival = step.rivals[0]
     others = tuple(effect for effect in choice.fit.effects if effect is not step.effect)
-    noise = {name: white(record[name]) for name in _noisy(nominal, record, control)}
+    noise = {name: white(record[name]) for name in _noisy(nominal, record)}
     found = []
-    for test in pushes(nominal, record, control):
+    pair = ((*others, rival.effect), (*others, step.effect))
+    of_air = all(effect.stage == "airframe" for effects in pair for effect in effects)
+    # A fault of the aircraft may show in the motion by any control that the record moves.
+    pushed = [c for c in nominal.controls if of_air and _is_pushed(record, c)]
+    for test in (test for c in pushed or [control] for test in pushes(nominal, record, c)):
         real = _as_flown(rival.fit.rig, test.rig, control).changed({"noise": noise})
-        pair = ((*others, rival.effect), (*others, step.effect))
         gain = _gain(test, real, control, pair, {**rival.fit.values, **choice.fit.values})
         if gain is not None:
             rivals = (step.effect.name, rival.effect.name)
@@ -78,17 +83,23 @@ def next_tests(
     return tuple(sorted(found, key=lambda item: -item.gain))
 
 
+def _is_pushed(record: Record, control: ControlName) -> bool:
+    """Tell whether the force on a control is more than noise."""
+    force = channel(control, "force")
+    return force in record and float(np.std(record[force])) > PUSHED * white(record[force])
+
+
 def _as_flown(rig: Rig, test: Rig, control: ControlName) -> Rig:
     """Return the rig in a test's flight condition; parameters of effects in the flight are kept."""
     if test.flight is None:
         return rig
     freed = [p.key for effect in EFFECTS for p in effect.parameters if p.key.startswith("flight.")]
-    kept = {key: value_of(rig, control, key) for key in freed}
+    kept = {key: value_of(rig, control, key) for key in (*freed, "flight.terms")}
     return rig.changed({"flight": test.flight}).changed(kept)
 
 
-def _noisy(rig: Rig, record: Record, control: ControlName) -> list[str]:
-    channels = noisy_channels([control], flown=rig.flight is not None)
+def _noisy(rig: Rig, record: Record) -> list[str]:
+    channels = noisy_channels(list(rig.controls), flown=rig.flight is not None)
     return [name for name in channels if name in record]
 
 
@@ -101,14 +112,16 @@ def _gain(
 ) -> float | None:
     """Return the gain of the first set over the second on a record simulated with the first."""
     try:
-        record = fly_force(real, {control: test.force_N}, test.pressure_Pa, seed=5)
+        record = fly_force(real, {test.control: test.force_N}, test.pressure_Pa, seed=5)
     except InputError:
         return None
     if record.manifest["ended_early"]:
         return None
-    reader = Reader(test.rig, record, control, surface_points)
-    outputs: list[Output] = reader.outputs()
-    if any(effect.stage == "airframe" for effect in pair[0] + pair[1]):
+    stages = {effect.stage for effect in pair[0] + pair[1]}
+    outputs = list[Output]()
+    if stages != {"airframe"}:
+        outputs += Reader(test.rig, record, control, surface_points).outputs()
+    if "airframe" in stages:
         outputs += airframe_outputs(test.rig, record)
     case = Case(test.rig, control, outputs)
     right, wrong = (Problem(case).fit(effects, start) for effects in pair)
@@ -126,8 +139,9 @@ def pushes(nominal: Rig, record: Record, control: ControlName) -> Iterator[Push]
     settings = _pressures(nominal, record, control, len(time))
     for text, shape in _shapes(time):
         for where, pressure, rig in settings:
-            text_of = f"{text} of ±{written} N for {TEST_s:g} s {where}"
-            yield Push(text_of, most * shape, pressure, rig)
+            on = f" on the {control}" if len(nominal.controls) > 1 else ""
+            text_of = f"{text} of ±{written} N{on} for {TEST_s:g} s {where}"
+            yield Push(text_of, most * shape, pressure, rig, control)
 
 
 def _shapes(time: Floats) -> list[tuple[str, Floats]]:
@@ -174,7 +188,7 @@ def in_one_line(
     """
     if tests_found:
         best = tests_found[0]
-        one, other = (name.replace("_", " ") for name in best.rivals)
+        one, other = map(plain, best.rivals)
         if best.gain < SEPARATED_GAIN:
             return (
                 f"No candidate test discriminates {one} from {other}:"

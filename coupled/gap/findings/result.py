@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from coupled.arguments import public
+from coupled.gap.effects.airframe import TERM
 from coupled.gap.findings.budget import StageBudget
 from coupled.gap.findings.credibility import Credibility, remainder
 from coupled.gap.findings.where import Remains, Where
@@ -143,7 +144,10 @@ class ParameterEstimate:
 
 @dataclass(frozen=True)
 class EffectResult:
-    """An effect found, with the probability that it is the cause."""
+    """An effect found, with the probability that it is the cause.
+
+    `of` is the aerodynamic function that it scales, if it is a term of the model.
+    """
 
     name: str
     stage: str
@@ -151,6 +155,7 @@ class EffectResult:
     parameters: tuple[ParameterEstimate, ...]
     credibility: Credibility | None = None
     course: Course | None = None
+    of: str = ""
 
     @property
     def value(self) -> float | None:
@@ -159,11 +164,12 @@ class EffectResult:
 
     def as_dict(self) -> dict[str, Any]:
         """Return the JSON."""
+        named = {"property": {"value": self.of, "low": None, "high": None}} if self.of else {}
         found: dict[str, Any] = {
-            "name": self.name,
+            "name": TERM if self.of else self.name,
             "stage": self.stage,
             "probability": self.probability,
-            "parameters": {p.name: p.as_dict() for p in self.parameters},
+            "parameters": {**named, **{p.name: p.as_dict() for p in self.parameters}},
         }
         if self.course is not None:
             found["course"] = self.course.as_dict()

@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from coupled.display import System, in_system, split_unit, unit_in
+from coupled.gap.effects.airframe import TERM
 from coupled.gap.effects.effect import dotted
 from coupled.gap.effects.library import BY_NAME
 from coupled.gap.findings.budget import StageBudget
@@ -30,6 +31,11 @@ OF_SIGNAL = {
     "elevator": "the elevator",
     "pitch_rate": "the pitch rate",
     "alpha": "the angle of attack",
+    "aileron": "the aileron",
+    "rudder": "the rudder",
+    "roll_rate": "the roll rate",
+    "yaw_rate": "the yaw rate",
+    "sideslip": "the sideslip",
 }
 
 
@@ -42,8 +48,8 @@ def in_figures(name: str, value: float) -> str:
 
 
 def plain(name: str) -> str:
-    """Return an effect's or a stage's name without its underscores."""
-    return name.replace("_", " ")
+    """Return an effect's or a stage's name without its underscores; a function keeps its own."""
+    return name if name.startswith(f"{TERM} ") else name.replace("_", " ")
 
 
 def filtered_words(filtered: Mapping[str, str]) -> str:
@@ -182,7 +188,11 @@ def _set(found: Findings) -> str:
     keys = [p.host or f"{dotted(p.key, found.control)} in the rig file" for p in numbers]
     said = [f"Set {key} to {_found(p)}." for key, p in zip(keys, numbers, strict=True)]
     switches = [
-        p for one in found.effects for p in BY_NAME[one.name].parameters if p.mode == "switch"
+        p
+        for one in found.effects
+        if one.name in BY_NAME
+        for p in BY_NAME[one.name].parameters
+        if p.mode == "switch"
     ]
     for one in switches:
         key = dotted(one.key_on(found.control), found.control)

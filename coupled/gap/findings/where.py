@@ -33,6 +33,10 @@ from coupled.record.channels import ControlName, channel, unit_of
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
 
+AIRFRAME = (
+    *("elevator_rad", "pitch_rate_rad_per_s", "alpha_rad"),
+    *("aileron_rad", "rudder_rad", "roll_rate_rad_per_s", "yaw_rate_rad_per_s", "sideslip_rad"),
+)
 Floats = NDArray[np.float64]
 
 
@@ -243,7 +247,7 @@ def signals(
         "loader": ("load_factor",),
         "schedule": ("dynamic_pressure_Pa",),
         "surface": ("dynamic_pressure_Pa",),
-        "airframe": ("elevator_rad", "pitch_rate_rad_per_s", "alpha_rad"),
+        "airframe": AIRFRAME,
     }
     for name in common.get(output.stage, ()):
         if name in record:

@@ -12,7 +12,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from coupled.gap.effects.effect import Effect, touched
-from coupled.gap.effects.library import BY_NAME
 from coupled.gap.search.beam import search_sets
 from coupled.gap.search.case import Case
 from coupled.gap.search.course import Bounds, Course, course_of, course_of_events, timing_of
@@ -43,8 +42,9 @@ def _search_with_onset(
     """
     open_outputs = _open_outputs(case, found)
     gains = {step.effect.name: step.gain for step in found.steps} or found.tried
+    known = {effect.name: effect for effect in library}
     for name in sorted(gains, key=lambda one: -gains[one])[:LATER_TRIED]:
-        effect = BY_NAME[name]
+        effect = known[name]
         anew = in_time(effect, case) if open_outputs & set(effect.shows_in) else None
         if anew is None:
             continue

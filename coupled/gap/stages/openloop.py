@@ -110,6 +110,7 @@ def fly_open_loop(
 ) -> Flown:
     """Return the flight of a model from its trim, driven by its surfaces; a row for each frame.
 
+    A channel may be any property of the model, in JSBSim's unit; it is 0 if the model lacks it.
     `air_m_per_s` is the vertical speed of the air over each frame. The conditions of the record's
     flight (`flown_in`) act on the model as on the aircraft. `between_rows` is how the commands
     change over a frame of several steps: `held`, as those of a host, or interpolated. `restarts`
@@ -159,8 +160,8 @@ def _motion(
 
     A row results from the commands of the row before, or is a state of `restarts`.
     """
-    each = [airframe.reader(PROPERTIES[name]) for name in channels]
-    step, readers = airframe.step, [read for read in each if read is not None]
+    each = [airframe.reader(PROPERTIES.get(name, name)) for name in channels]
+    step, readers = airframe.step, [read or float for read in each]
     motion: list[list[float]] = []
     for k, (a, b, c) in enumerate(asked.tolist()):
         now = [read() for read in readers]

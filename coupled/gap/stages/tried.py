@@ -6,6 +6,8 @@ The library says in which stages an effect shows. What a record holds changes th
     imposed motion                 they show in the force; the motion of the grip is given
     set points                     a commanded number has no sensor, and the servo has reached the
                                    speed that the grip was measured at
+    no lateral motion              effects that show in it are not tried; nor are those of parts
+                                   that the aircraft's model lacks
 """
 
 from __future__ import annotations
@@ -17,12 +19,15 @@ from functools import cache, partial
 import numpy as np
 from scipy.linalg import eigh
 
+from coupled.flight.airframe import main_file
+from coupled.flight.altered import ALTERATIONS, parts_of
 from coupled.gap.effects.effect import Effect, Parameter, dotted
 from coupled.gap.effects.scales import Scales, in_scale
 from coupled.gap.noise.smooth import smoothed
 from coupled.gap.signals.output import Floats, Output, estimate_noise
 from coupled.gap.stages.stages import Reader
 from coupled.gap.thresholds import (
+    LATERAL_MOVES,
     MISMATCH,
     PLAY_LEAST,
     PLAYS,
@@ -30,12 +35,14 @@ from coupled.gap.thresholds import (
     REACHED_BEYOND,
     REACHED_OVER,
 )
-from coupled.record.channels import ControlName, channel, unit_of
+from coupled.record.channels import LATERAL, ControlName, channel, unit_of
 from coupled.record.record import Record
+from coupled.resources import aircraft_folder
 from coupled.rig.rig import Rig
 
 OF_PLAY = "loader.play"  # its key in a rig file without the unit
 GRAVITY = "loader.gravity_N"
+PARTS = {alteration.part.name for alteration in ALTERATIONS}
 RATE_LIMIT = "loader.servo_rate_limit_{d}_per_s"
 
 
@@ -45,6 +52,7 @@ def tried_effects(
     """Return the effects that records let be tried, with the outputs in which they show."""
     records, control = [reader.record for reader in readers], readers[0].control
     known = [effect for effect in library if effect.can_be_tried(records, control)]
+    known = _of_aircraft(known, readers[0].rig, records)
     known = as_judged(known, readers, outputs)
     if not _turns_far(readers):
         known = [one for one in known if all(p.key != GRAVITY for p in one.parameters)]
@@ -77,6 +85,36 @@ def _turns_far(readers: Sequence[Reader]) -> bool:
         if least > MISMATCH**2:
             return True
     return False
+
+
+def _of_aircraft(effects: Sequence[Effect], rig: Rig, records: Sequence[Record]) -> list[Effect]:
+    """Return effects without those whose part the model lacks, or whose lateral motion is noise."""
+    if rig.flight is None:
+        return list(effects)
+    lacking = lacking_keys(rig)
+    still = {name for name in LATERAL if not any(_moves(name, record) for record in records)}
+    return [
+        effect
+        for effect in effects
+        if effect.stage != "airframe"
+        or not (lacking & {p.key for p in effect.parameters} or still & {*effect.needs})
+    ]
+
+
+def lacking_keys(rig: Rig) -> set[str]:
+    """Return the keys of the factors on parts that a rig's model lacks."""
+    if rig.flight is None:
+        return set()
+    parts = parts_of(main_file(rig.flight, [aircraft_folder()], rig.name))
+    return {f"flight.{key}" for key in PARTS - parts}
+
+
+def _moves(name: str, record: Record) -> bool:
+    """Tell whether a channel shows more than noise."""
+    if name not in record:
+        return False
+    noise = estimate_noise(record[name]).rms
+    return float(np.std(record[name])) > LATERAL_MOVES * noise
 
 
 def as_judged(

@@ -17,6 +17,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
 from coupled.gap.noise.smooth import smoothed
@@ -32,6 +33,7 @@ from coupled.gap.stages.surfaces import (
     surface_points,
 )
 from coupled.gap.thresholds import (
+    FIRST_ROWS,
     TRIM_ANSWERED,
     TRIM_SIGMAS,
     TRIM_SINCE,
@@ -70,9 +72,10 @@ def trim_of(rig: Rig, record: Record, control: ControlName) -> Trim | None:
         return None
     own, noise, first = own_trim(rig, control), white(record[name]), float(record[name][0])
     off = _standing_off(rig, record, control)
-    if off is None:  # by the first row alone
-        at = own if abs(first - own) <= TRIM_SIGMAS * noise else first
-        return Trim(at, first, noise)
+    if off is None:  # by the rows before it moves
+        start, error = _start_of(record[name][: max(2, round(TRIM_s * rig.frame_rate))], noise)
+        at = own if abs(start - own) <= TRIM_SIGMAS * error else start
+        return Trim(at, start, error)
     standing, error = off
     if abs(standing) <= TRIM_SIGMAS * error:
         return Trim(own, own + standing, error)
@@ -81,6 +84,24 @@ def trim_of(rig: Rig, record: Record, control: ControlName) -> Trim | None:
     flown = _followed(rig, record, control, own, there) if control == "column" else None
     in_trim = evidence > TRIM_SINCE if flown is None else evidence + flown > -TRIM_SINCE
     return Trim(there, there, error) if in_trim else Trim(own, own, noise, standing)
+
+
+def _start_of(position: Floats, noise: float) -> tuple[float, float]:
+    """Return a surface's position in the first row, rad, and its standard error.
+
+    From the rows before it moves by more than noise: their mean, or the start of a parabola if that
+    improves the fit.
+    """
+    moves = np.abs(position - position[:FIRST_ROWS].mean()) > TRIM_SIGMAS * noise
+    rows = int(np.argmax(moves)) if moves.any() else len(position)
+    if rows < FIRST_ROWS:
+        return float(position[0]), noise
+    seen, at = position[:rows], np.arange(rows)
+    mean, parabola = float(seen.mean()), Polynomial.fit(at, seen, 2)
+    gained = float(np.sum((seen - mean) ** 2 - (seen - parabola(at)) ** 2))
+    if gained < TRIM_ANSWERED * noise**2:
+        return mean, noise / math.sqrt(rows)
+    return float(parabola(0.0)), 3.0 * noise / math.sqrt(rows)  # of the end of a parabola
 
 
 def _standing_off(rig: Rig, record: Record, control: ControlName) -> tuple[float, float] | None:

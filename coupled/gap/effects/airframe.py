@@ -1,0 +1,86 @@
+"""Effects of the airframe: its forces and moments, its mass, and the motion of the air.
+
+An effect whose moment needs lateral motion is tried only with records that have its channel.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from coupled.gap.effects.effect import TERMS, Drawing, Effect, Parameter, Sampled, Signature
+from coupled.gap.effects.entries import added, factor, one, value
+from coupled.gap.signals.air import NEEDS as AIR
+from coupled.gap.signals.air import spread_of_air
+
+_ROLL, _YAW, _SLIP = "roll_rate_rad_per_s", "yaw_rate_rad_per_s", "sideslip_rad"
+TERM = "term"  # the name of an effect of a named function, in the JSON
+_NEEDS = {"ROLL": (_ROLL,), "YAW": (_YAW,), "SIDE": (_SLIP,), "Y": (_SLIP,)}
+_DRAWN = {
+    "ROLL": Signature("roll_rate", "roll_left", "law", 4.0),
+    "YAW": Signature("yaw_rate", "yaw_left", "law", 4.0),
+    "SIDE": Signature("sideslip", "yaw_left", "law", 4.0),
+    "PITCH": Signature("alpha", "pitch_rate", "loop", 4.0),
+}
+
+
+def _factor_on(
+    name: str,
+    start: float,
+    x: str,
+    y: str,
+    drawing: Drawing = "law",
+    needs: tuple[str, ...] = (),
+    bounds: tuple[float, float] = (0.1, 10.0),
+) -> Effect:
+    """Return the effect of a factor of the rig's `flight` section."""
+    number = factor(f"flight.{name}", start, *bounds)
+    return replace(one("airframe", name, number, x, y, drawing, 4.0), needs=needs)
+
+
+AIRFRAME: tuple[Effect, ...] = (
+    _factor_on("elevator_effectiveness", 0.9, "elevator", "pitch_rate", "loop"),
+    _factor_on("aileron_effectiveness", 0.9, "aileron", "roll_rate", "loop", (_ROLL,)),
+    _factor_on("rudder_effectiveness", 0.9, "rudder", "yaw_rate", "loop", (_YAW,)),
+    _factor_on("pitch_damping", 1.2, "pitch_rate", "pitch_left"),
+    _factor_on("roll_damping", 1.2, "roll_rate", "roll_left", needs=(_ROLL,)),
+    _factor_on("yaw_damping", 1.2, "yaw_rate", "yaw_left", needs=(_YAW,)),
+    _factor_on("pitch_stiffness", 1.1, "alpha", "pitch_rate", "loop"),
+    _factor_on("dihedral_effect", 1.1, "sideslip", "roll_rate", "loop", (_ROLL,)),
+    _factor_on("directional_stability", 1.1, "sideslip", "yaw_rate", "loop", (_YAW,)),
+    _factor_on("side_force_slope", 1.1, "sideslip", "yaw_left", needs=(_SLIP,)),
+    _factor_on("adverse_yaw", 1.2, "aileron", "yaw_rate", "loop", (_YAW,)),
+    _factor_on("lift_slope", 0.97, "alpha", "load_answer", "loop", bounds=(0.2, 5.0)),
+    _factor_on("drag", 1.1, "alpha", "load_answer", "loop"),
+    _factor_on("thrust", 1.1, "alpha", "load_answer", "loop"),
+    _factor_on("mass", 1.03, "alpha", "load_answer", "loop", bounds=(0.3, 3.0)),
+    _factor_on("roll_inertia", 1.1, "aileron", "roll_rate", "loop", (_ROLL,)),
+    _factor_on("pitch_inertia", 1.1, "elevator", "pitch_rate", "loop"),
+    _factor_on("yaw_inertia", 1.1, "rudder", "yaw_rate", "loop", (_YAW,)),
+    one(
+        "airframe",
+        "center_of_gravity",
+        added("aft_m", "flight.cg_aft_m", -2.0, 2.0, 0.02),
+        *("alpha", "pitch_rate", "loop", 4.0),
+    ),
+    replace(
+        one(
+            "airframe",
+            "vertical_gust",
+            value("rms_m_per_s", "flight.gust_rms_m_per_s", 0, 30, 0.5),
+            *("", "air", "time", 6.0),
+        ),
+        needs=AIR,
+        sampled=Sampled(spread_of_air),
+    ),
+)
+
+
+def term(function: str, axis: str) -> Effect:
+    """Return the effect of a factor on a named function of an axis of the model's aerodynamics.
+
+    That of a lateral axis needs the motion of the axis.
+    """
+    number = Parameter("factor", f"flight.{TERMS}{function}", "factor", 0.0, 10.0, (0.9,))
+    drawn = _DRAWN.get(axis, Signature("alpha", "load_answer", "loop", 4.0))
+    needs = _NEEDS.get(axis, ())
+    return Effect(f"{TERM} {function}", "airframe", (number,), drawn, needs=needs, of=function)
