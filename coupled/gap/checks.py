@@ -22,8 +22,13 @@ SPEED = "true_airspeed_m_per_s"
 START_ROWS = 12  # chosen: a tenth of a second at 120 Hz, before a pilot has changed the motion
 
 
-def check_record(rig: Rig, record: Record, control: ControlName, file: object) -> None:
-    """Check that a record can be of a rig. Raises InputError with the reason if it cannot."""
+def check_record(
+    rig: Rig, record: Record, control: ControlName, file: object, moved: bool = True
+) -> None:
+    """Check that a record can be of a rig. Raises InputError with the reason if it cannot.
+
+    The channels of the control are checked if it is to be `moved`.
+    """
     if control not in rig.controls:
         raise InputError(file, control, f"the rig has no {control}")
     if rig.controls[control].schedule.deflection is not None:
@@ -48,7 +53,8 @@ def check_record(rig: Rig, record: Record, control: ControlName, file: object) -
         if not np.all(np.isfinite(record[name])):
             row = int(np.argmax(~np.isfinite(record[name])))
             raise InputError(file, name, f"row {row + 2} holds no number")
-    _check_channels(rig, record, control, file)
+    if moved:
+        _check_channels(rig, record, control, file)
 
 
 def _check_channels(rig: Rig, record: Record, control: ControlName, file: object) -> None:

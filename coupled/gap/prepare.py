@@ -11,8 +11,9 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 
 from coupled.errors import InputError
+from coupled.gap.chain import AIRFRAME, Part
 from coupled.gap.checks import check_record, check_trim
-from coupled.gap.effects.effect import Effect
+from coupled.gap.effects.effect import Effect, keys_of
 from coupled.gap.effects.library import library_of
 from coupled.gap.findings.healthy import Baseline
 from coupled.gap.search.case import Case, Tell
@@ -30,18 +31,20 @@ from coupled.gap.trimmed import trim_speed, trimmed
 from coupled.parallel import in_threads
 from coupled.record.channels import ControlName
 from coupled.record.record import Record
+from coupled.rig.parameters import Flight
 from coupled.rig.rig import Rig
 
 
 @dataclass(frozen=True)
 class Prepared:
-    """Prepared records of one control of a rig.
+    """Prepared records of one part of a diagnosis.
 
     `case` holds the rig and the outputs, `library` the effects that can be tried. `trim` and
     `left_out` are sentences for the report: the trim that was taken from the records, and the parts
     of live records that are not judged. `baseline` is the healthy machine, if it is known.
     """
 
+    part: Part
     case: Case
     library: tuple[Effect, ...]
     readers: tuple[Reader, ...]
@@ -54,34 +57,40 @@ class Prepared:
 def prepare(
     rig: Rig,
     records: Mapping[str, Record],
-    control: ControlName = "column",
+    part: Part,
     tell: Tell | None = None,
     baseline: Baseline | None = None,
+    flight: Flight | None = None,
 ) -> Prepared:
-    """Return records prepared for a diagnosis, by their files' names.
+    """Return records prepared for the diagnosis of a part, by their files' names.
 
     With a `baseline`, the rig is that of the healthy machine, and its model error raises the noise
-    floors. Raises InputError if a record cannot be of this rig, or if no stage can be judged.
+    floors. `flight` is the aircraft with what was found in it before. Raises InputError if a record cannot be of this rig, or if no stage can be judged.
     """
     if baseline is not None:
         rig = baseline.rig
+    if flight is not None:
+        rig = rig.changed({"flight": flight})
+    control = part.control
     live = [one for one in map(live_of, records.values()) if one is not None]
     records = {file: judged_part(record, file) for file, record in records.items()}
     rig = as_driven(rig, list(records.values()), control) if control in rig.controls else rig
     rig, trim = trimmed(rig, records)
     for file, record in records.items():
-        check_record(rig, record, control, file)
+        check_record(rig, record, control, file, moved=part.own)
         if rig.flight is not None:
             check_trim(trim_speed(rig), record, file)
     rig = as_counted(rig, list(records.values()), control)
-    judged = Judged(rig, readers_of(rig, records, control), baseline)
+    judged = Judged(rig, part, readers_of(rig, records, control), baseline)
     outputs = [
         allowing_for_contact(output.halved(rig), rig, control) for output in judged.under(rig)
     ]
     if not outputs:
         raise InputError(next(iter(records)), "", _too_little(rig, control, judged.readers))
-    library = tried_effects(library_of(rig, control), judged.readers, outputs)
+    library = [one for one in library_of(rig, control) if part.frees(keys_of([one]))]
+    library = tried_effects(library, judged.readers, outputs)
     return Prepared(
+        part,
         Case(rig, control, outputs, tell, judged.under, model_error_in_floors=baseline is not None),
         tuple(library),
         tuple(judged.readers),
@@ -107,6 +116,7 @@ class Judged:
     """
 
     rig: Rig
+    part: Part
     readers: Sequence[Reader]
     baseline: Baseline | None = None
     _flights: dict[int, Flights] = field(default_factory=dict, repr=False, compare=False)
@@ -123,16 +133,17 @@ class Judged:
 
     def _made(self, rig: Rig) -> list[Output]:
         readers = [replace(reader, rig=rig) for reader in self.readers]
-        makers: list[Callable[[], list[Output]]] = [reader.outputs for reader in readers]
+        own = readers if self.part.own else []
+        makers: list[Callable[[], list[Output]]] = [reader.outputs for reader in own]
         alike = bool(self._known) and _has_same_flight(self.rig, rig)
-        for one in () if alike else readers:
+        for one in readers if self.part.airframe and not alike else []:
             flights = self._flights.setdefault(one.number, Flights())
             makers.append(partial(airframe_outputs, one.rig, one.record, one.number, flights))
         made = [output for each in in_threads(lambda make: make(), makers) for output in each]
         if alike:
             made += self._flown
         elif rig == self.rig:
-            self._flown[:] = [output for output in made if output.stage == "airframe"]
+            self._flown[:] = [output for output in made if output.stage == AIRFRAME]
         return made if self.baseline is None else self.baseline.raised(made)
 
 

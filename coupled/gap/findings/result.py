@@ -19,8 +19,19 @@ from coupled.gap.thresholds import FAULTY_FROM
 
 # Of the JSON. A file without a format is read as one from before formats were numbered; a newer
 # format is refused (`files.check_format`).
-FORMAT = 2
+FORMAT = 3
 Verdict = Literal["no_gap", "effect", "mostly", "ambiguous", "unexplained"]
+
+
+def labelled(name: str, control: str | None) -> str:
+    """Return an effect's name for people; with its control, if given."""
+    words = name.replace("_", " ")
+    return f"{control} {words}" if control else words
+
+
+def placed(stage: str, control: str | None) -> str:
+    """Return a stage's name among those of several controls; of one control, the stage's own."""
+    return f"{control}.{stage}" if control else stage
 
 
 @dataclass(frozen=True)
@@ -148,6 +159,17 @@ class EffectResult:
     parameters: tuple[ParameterEstimate, ...]
     credibility: Credibility | None = None
     course: Course | None = None
+    control: str | None = None  # where several are judged; None for the airframe
+
+    @property
+    def label(self) -> str:
+        """Its name for people, with its control where several are judged."""
+        return labelled(self.name, self.control)
+
+    @property
+    def place(self) -> str:
+        """Its stage, with its control where several are judged: `linkage` or `column.linkage`."""
+        return placed(self.stage, self.control)
 
     @property
     def value(self) -> float | None:
@@ -199,8 +221,8 @@ class SettingResult:
 class Findings:
     """The results of a diagnosis: verdict, stages, effects and budget.
 
-    `stages` are in the order of the chain, `effects` with the largest first; `rivals` are groups
-    of effects that the records do not distinguish.
+    `control` may be `airframe`. `stages` are in the order of the chain, `effects` with the largest
+    first; `rivals` are groups of effects that the records do not distinguish.
     """
 
     control: str
