@@ -39,7 +39,8 @@ def diagnose(
     `found.budget` shares each guilty stage's residual out to them, to what no effect explains,
     and to noise; `found.improved` is the rig with them; `found.as_dict()` the JSON of the command
     line. `found.controls` are the judged controls; of several, an effect has its `control`, and
-    `found.parts` are the diagnoses of each control and of the airframe. Raises InputError where records and rig cannot be held against each other.
+    `found.parts` are the diagnoses of each control and of the airframe. Raises InputError where
+    records and rig cannot be held against each other.
 
     >>> import coupled
     >>> rig = coupled.load_rig("t37")

@@ -217,7 +217,7 @@ def _write_improved(
         text = read_text(rig_file, "a rig file is wanted")
     remark = f"{held} with what was found in {names}:\n{whole.summary}\n"
     for effect in whole.effects:
-        remark += "".join(f"changed: {p.key} {change(p)}\n" for p in effect.parameters)
+        remark += "".join(f"changed: {effect.key_of(p)} {change(p)}\n" for p in effect.parameters)
     for setting in (one for one in whole.settings if one.moved):
         remark += f"changed: {setting.words}, within its tolerance\n"
     remark += "".join(f"{sentence}\n" for sentence in outdated_bends(filed, whole.improved))

@@ -55,11 +55,11 @@ OF_FLIGHT = "flight."  # how the keys of the aircraft start in a rig file
 
 @dataclass(frozen=True)
 class Part:
-    """The stages that one search judges: a control's `own` up to the surface, the airframe, or both.
+    """The stages that one search judges: a control's `own`, the airframe, or both.
 
-    If the records move one control, they are one part. If they move several, each control is a part
-    and the airframe, which all of them move, is another. `control` is then the first of them; its
-    motion defines the regimes in which the sizes of the aircraft's effects are compared.
+    If the records move one control, they are one part. If they move several, the stages of each
+    control up to its surface are a part, and the airframe, which all of them move, is another. Its
+    `control` is the first; sizes of the aircraft's effects are compared in regimes of its motion.
     """
 
     control: ControlName
@@ -81,7 +81,7 @@ class Part:
         return self.airframe if of_flight else self.own
 
     def owner(self, stage: str) -> ControlName | None:
-        """Return the control of a stage; None for the airframe, and for the sensors of its motion."""
+        """Return the control of a stage; None for the airframe and the sensors of its motion."""
         return self.control if self.own and stage != AIRFRAME else None
 
 

@@ -122,7 +122,11 @@ def _told(tell: Tell | None, part: Part, parts: Collection[Part]) -> Tell | None
 
 def _left_out(found: PartDiagnosis, held: Sequence[ControlName]) -> tuple[str, ...]:
     """Return what is not judged, with the controls that the records hold at rest."""
-    words = (f"The {name} is not judged: no record moves it." for name in held)
+    words = (
+        f"The {name} {'are' if name == 'pedals' else 'is'} not judged: no record moves"
+        f" {'them' if name == 'pedals' else 'it'}."
+        for name in held
+    )
     return (*found.left_out, *words)
 
 

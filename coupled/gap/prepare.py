@@ -65,7 +65,8 @@ def prepare(
     """Return records prepared for the diagnosis of a part, by their files' names.
 
     With a `baseline`, the rig is that of the healthy machine, and its model error raises the noise
-    floors. `flight` is the aircraft with what was found in it before. Raises InputError if a record cannot be of this rig, or if no stage can be judged.
+    floors. `flight` is the aircraft with what was found in it before. Raises InputError if a record
+    cannot be of this rig, or if no stage can be judged.
     """
     if baseline is not None:
         rig = baseline.rig

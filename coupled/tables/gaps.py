@@ -6,7 +6,6 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from coupled.display import Shown, System, drawn, percent, split_unit
-from coupled.gap.effects.effect import dotted
 from coupled.gap.findings.budget import StageBudget, share_of
 from coupled.gap.findings.result import EffectResult, ParameterEstimate, StageResult, labelled
 from coupled.gap.findings.summary import change, figure, in_units, labels, plain, size_in
@@ -65,7 +64,7 @@ def _effect(effect: EffectResult, budget: Sequence[StageBudget], system: System)
 def keys_table(effects: Sequence[EffectResult], system: System = "si") -> Table:
     """Return the keys of the rig file that the effects change: filed value, found value."""
     rows = tuple(
-        (dotted(p.key, effect.control) if effect.control else p.key, p.unit, "none" if p.filed is None else figure(p.filed), *_found(p))
+        (effect.key_of(p), p.unit, "none" if p.filed is None else figure(p.filed), *_found(p))
         for effect in effects
         for p in (in_units(each, system) for each in effect.parameters)
     )

@@ -2,47 +2,19 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from coupled.gap.diagnose import diagnose
 from coupled.gap.effects.effect import apply
 from coupled.gap.effects.library import BY_NAME
 from coupled.gap.findings.flown import closed_loop, fly_force
 from coupled.gap.stages.surfaces import surface_points
-from coupled.record.channels import ControlName, noisy_channels
+from coupled.record.channels import ControlName
 from coupled.record.record import Record
 from coupled.resources import aircraft_folder
 from coupled.rig.rig import Rig
 from coupled.rig.rigfile import read_rig
-
-PUSH_N = {"column": 40.0, "wheel": 25.0, "pedals": 80.0}
-LONG_s = 30.0
-# Standard deviations of white noise by the end of a channel's name.
-NOISE = {"_N": 0.1, "_m": 5e-5, "_Pa": 10.0, "_rad": 3e-4, "_s": 3e-4, "factor": 3e-3}
-OF_THE_AIR = {"true_airspeed_m_per_s": 0.1, "altitude_m": 0.3, "wheel_deflection_rad": 1e-3}
-
-
-def noisy(rig: Rig) -> Rig:
-    levels = {
-        name: OF_THE_AIR.get(name, next(v for end, v in NOISE.items() if name.endswith(end)))
-        for name in noisy_channels(list(rig.controls), flown=True)
-    }
-    return rig.changed({"noise": levels})
-
-
-def pushes(rig: Rig, **size_N: float) -> dict[ControlName, NDArray[np.float64]]:
-    """Return bell-shaped pushes of each control in turn, N; `size_N` gives those of some."""
-    t = np.arange(round(LONG_s * rig.frame_rate)) / rig.frame_rate
-    made = {}
-    for i, control in enumerate(rig.controls):
-        rng = np.random.default_rng(i)
-        sizes = rng.uniform(0.3, 1.0, 8) * np.where(np.arange(8) % 2, 1.0, -1.0)
-        at = 2.0 + 0.7 * i + 3.2 * np.arange(8)
-        bells = np.exp(-(((t[:, None] - at) / 0.35) ** 2))
-        made[control] = size_N.get(control, PUSH_N[control]) * bells @ sizes
-    return made
+from tests.support.threecontrols import noisy, pushes
 
 
 @pytest.fixture(scope="module")
@@ -83,7 +55,7 @@ def test_a_surface_of_wheel_and_pedals_is_judged(
     assert number.low is not None and number.high is not None
     assert number.low < value < number.high
     assert whole.guilty == ("surface",)
-    again = closed_loop(cessna, whole.improved, control, record)
+    again = closed_loop(cessna, whole.improved, [control], record)
     assert again is not None
     rate = "roll_rate_rad_per_s" if control == "wheel" else "yaw_rate_rad_per_s"
     [turned] = [one for one in again if one.channel == rate]

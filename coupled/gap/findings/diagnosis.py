@@ -230,12 +230,17 @@ class PartDiagnosis(Diagnosis):
 
     @property
     def parts(self) -> tuple[PartDiagnosis, ...]:
-        """This diagnosis alone."""
+        """The diagnosis itself."""
         return (self,)
 
     def control_of(self, effect: EffectResult) -> str | None:
         """Return the control of an effect; None for one of the airframe."""
         return self.part.owner(effect.stage)
+
+    @property
+    def gains(self) -> list[float]:
+        """The log evidence lost without each of the effects, in their order."""
+        return sorted((step.gain for step in self.choice.steps), reverse=True)
 
     def rig_with(self, effects: Sequence[Effect]) -> Rig:
         """Return the rig with some of the effects found, and the fitted nuisance parameters."""

@@ -39,9 +39,10 @@ class EffectInFlight:
     """The change of the flight by one effect, by channel.
 
     `shares` are of the power of the change by all effects, and sum to 1; negative if the effect
-    counteracts the others. `control` is that of the effect, where several are judged. `changes` are the RMS differences if the effect is removed, in the
+    counteracts the others. `changes` are the RMS differences if the effect is removed, in the
     channel's unit. `of_motion` is the same over the RMS of the channel's motion, with all effects
     or with none, whichever is larger. `share` is over all channels, each normalised by its motion.
+    `control` is that of the effect where several are judged; None for the airframe.
     """
 
     name: str

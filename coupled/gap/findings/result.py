@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from coupled.arguments import public
+from coupled.gap.effects.effect import dotted
 from coupled.gap.findings.budget import StageBudget
 from coupled.gap.findings.credibility import Credibility, remainder
 from coupled.gap.findings.where import Remains, Where
@@ -175,6 +176,10 @@ class EffectResult:
     def value(self) -> float | None:
         """The value of its first parameter; None if it has none (a discrete effect)."""
         return self.parameters[0].value if self.parameters else None
+
+    def key_of(self, parameter: ParameterEstimate) -> str:
+        """Return a parameter's key in the rig file; with its control where several are judged."""
+        return dotted(parameter.key, self.control) if self.control else parameter.key
 
     def as_dict(self) -> dict[str, Any]:
         """Return the JSON."""

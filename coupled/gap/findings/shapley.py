@@ -28,7 +28,12 @@ def shapley_subsets(players: int) -> tuple[list[int], Floats]:
     if players <= MOST_PLAYERS:
         return list(range(2**players)), shapley_weights(players)
     whole = 2**players - 1
-    subsets = [0, *(1 << i for i in range(players)), *(whole - (1 << i) for i in range(players)), whole]
+    subsets = [
+        0,
+        *(1 << i for i in range(players)),
+        *(whole - (1 << i) for i in range(players)),
+        whole,
+    ]
     one = np.eye(players)
     none = np.ones((players, 1))
     return subsets, 0.5 * np.hstack([none, -one, one, -none])

@@ -57,15 +57,16 @@ class WholeDiagnosis(Diagnosis):
         stages = [_placed(part, stage) for part in parts for stage in part.stages]
         stages.sort(key=lambda one: (not one.guilty, STAGES.index(one.name.rpartition(".")[2])))
         effects = [
-            replace(effect, control=part.part.owner(effect.stage))
+            (gain, replace(effect, control=part.part.owner(effect.stage)))
             for part in parts
-            for effect in part.effects
+            for gain, effect in zip(part.gains, part.effects, strict=True)
         ]
+        effects.sort(key=lambda one: -one[0])
         return cls(
             control=joined([part.control for part in parts if part.part.own]),
             verdict=verdict_of_all(parts),
             stages=tuple(stages),
-            effects=tuple(effects),
+            effects=tuple(effect for _, effect in effects),
             rivals=tuple(group for part in parts for group in part.rivals),
             settings=tuple(
                 replace(one, name=placed(one.name, part.part.owner(one.stage)))
