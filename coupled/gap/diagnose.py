@@ -60,7 +60,7 @@ def diagnose(
     stage can be judged.
     """
     with threads(workers):
-        parts, held = parts_of(rig, records, control)
+        parts, words = parts_of(rig, records, control)
         well = _of_parts(rig, healthy, list(parts)) if healthy else {}
 
         def reference(part: Part, flight: Flight | None) -> Baseline:
@@ -76,7 +76,8 @@ def diagnose(
             return findings(made, *search(made.case, made.library))
 
         found = _airframe_first(list(parts), diagnosed, lambda known: known.improved)
-        each = [replace(found[part], left_out=_left_out(found[part], held)) for part in parts]
+        made = [found[part] for part in parts]
+        each = [replace(one, left_out=(*one.left_out, *words)) for one in made]
     if len(each) == 1:
         return each[0]
     names = {file: None for part in parts for file in parts[part]}
@@ -118,16 +119,6 @@ def _told(tell: Tell | None, part: Part, parts: Collection[Part]) -> Tell | None
     if tell is None or len(parts) == 1:
         return tell
     return lambda what, done, total: tell(f"{part.name}: {what}", done, total)
-
-
-def _left_out(found: PartDiagnosis, held: Sequence[ControlName]) -> tuple[str, ...]:
-    """Return what is not judged, with the controls that the records hold at rest."""
-    words = (
-        f"The {name} {'are' if name == 'pedals' else 'is'} not judged: no record moves"
-        f" {'them' if name == 'pedals' else 'it'}."
-        for name in held
-    )
-    return (*found.left_out, *words)
 
 
 def findings(prepared: Prepared, case: Case, choice: Choice) -> PartDiagnosis:

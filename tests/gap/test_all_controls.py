@@ -85,11 +85,22 @@ def test_one_moving_control_is_judged_with_the_airframe() -> None:
 
 def test_a_control_that_a_force_does_not_move_is_named() -> None:
     held = at_rest(short(), "pedals", force=True)
-    assert found_parts(held)[1] == ("pedals",)
+    said = ("The pedals are not judged: no record moves them.",)
+    assert found_parts(held)[1] == said
     found = diagnose(cessna(), {"r": at_rest(held, "column")})
     assert found.controls == ("wheel",)
-    assert "The pedals is not judged" not in found.summary
-    assert found.left_out == ("The pedals are not judged: no record moves them.",)
+    assert found.left_out == said
+    assert found.summary.endswith(said[0])
+
+
+def test_a_control_whose_force_alone_is_recorded_is_not_judged() -> None:
+    """Its force is recorded for the crosstalk into the others."""
+    alone = without(short(), *(f"wheel_{rest}" for rest in ("comp", "defl", "est", "grad", "mod")))
+    assert "wheel_force_N" in alone.channels
+    named = {part.name for part in found_parts(alone)[0]}
+    assert named == {"column", "pedals", "airframe"}
+    lacking = without(short(), "wheel_defl", "wheel_est", "wheel_grad", "wheel_mod", "dynamic")
+    assert found_parts(lacking)[1] == ("The wheel is not judged: the records lack its channels.",)
 
 
 def test_an_airframe_that_cannot_be_judged_is_listed_once_with_what_it_lacks() -> None:
@@ -101,7 +112,9 @@ def test_an_airframe_that_cannot_be_judged_is_listed_once_with_what_it_lacks() -
 
 
 def test_records_may_move_one_control_each() -> None:
-    records = {name: at_rest(short(), *({*CONTROL_NAMES} - {name})) for name in CONTROL_NAMES}
+    records: dict[str, Record] = {
+        name: at_rest(short(), *({*CONTROL_NAMES} - {name})) for name in CONTROL_NAMES
+    }
     parts, _ = parts_of(cessna(), records, None)
     assert {part: list(ours) for part, ours in parts.items()} == {
         **{Part(name, airframe=False): [name] for name in CONTROL_NAMES},
