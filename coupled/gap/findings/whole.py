@@ -122,9 +122,9 @@ class WholeDiagnosis(Diagnosis):
     def summary(self) -> str:
         """The faults of each part, and what to record next."""
         words = {part.control: part.words() for part in self.parts}
-        clear = [name for name, said in words.items() if said == no_gap_in([name])]
-        said = [self.trim]
-        said += [f"{capital(name)}: {one}" for name, one in words.items() if name not in clear]
+        clear = [name for name, one in words.items() if one.startswith(no_gap_in([name]))]
+        words |= {name: words[name].removeprefix(no_gap_in([name])).strip() for name in clear}
+        said = [self.trim, *(f"{capital(name)}: {one}" for name, one in words.items() if one)]
         said += [no_gap_in(clear)] if clear else []
         said += [in_words(self.in_flight)] if self.in_flight is not None else []
         said += [self.next_test, *self.left_out]
