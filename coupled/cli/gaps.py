@@ -61,7 +61,11 @@ def diagnose(
     ] = None,
     plots: Annotated[
         Path | None,
-        typer.Option(metavar="DIR", help="Draw the figures ladder, stages and signature there."),
+        typer.Option(
+            metavar="DIR",
+            help="Draw the figures ladder, stages and signature there; of several controls, those"
+            " of each with a gap, and of the airframe.",
+        ),
     ] = None,
     power: Annotated[
         bool, typer.Option("--power", help="Say what size of each effect would have shown.")
