@@ -62,6 +62,8 @@ def diagnose(
     with threads(workers):
         parts, words = parts_of(rig, records, control)
         well = _of_parts(rig, healthy, list(parts)) if healthy else {}
+        alone = [part.name for part in parts if healthy and part not in well]
+        words += tuple(f"No healthy record moves the {n}; noise is the limit." for n in alone)
 
         def reference(part: Part, flight: Flight | None) -> Baseline:
             made = prepare(rig, well[part], part, _told(tell, part, parts), None, flight)
@@ -80,9 +82,8 @@ def diagnose(
         each = [replace(one, left_out=(*one.left_out, *words)) for one in made]
     if len(each) == 1:
         return each[0]
-    names = {file: None for part in parts for file in parts[part]}
     judged = {file: one for part in each for file, one in part.records.items()}
-    return WholeDiagnosis.of(each, {file: judged[file] for file in records if file in names})
+    return WholeDiagnosis.of(each, {file: judged[file] for file in records if file in judged})
 
 
 def _airframe_first(

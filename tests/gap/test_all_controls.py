@@ -15,7 +15,7 @@ import coupled as package
 from coupled.errors import InputError
 from coupled.gap.batch import Job, Row
 from coupled.gap.chain import Part
-from coupled.gap.diagnose import diagnose
+from coupled.gap.diagnose import _airframe_first, diagnose
 from coupled.gap.findings.diagnosis import Diagnosis
 from coupled.gap.findings.result import Findings, Verdict
 from coupled.gap.findings.shapley import MOST_PLAYERS, shapley_subsets
@@ -261,6 +261,29 @@ def test_healthy_records_of_the_shipped_rigs_have_no_gap(
     assert (found.verdict, found.controls) == ("no_gap", CONTROL_NAMES), found.summary
 
 
+def test_the_controls_are_given_the_aircraft_that_was_found() -> None:
+    """The trim positions of the surfaces depend on it, so the airframe is searched first."""
+    heavy = cessna().changed({"flight.mass": 1.1})
+    given: dict[str, Any] = {}
+
+    def work(part: Part, flight: Any) -> Rig:
+        given[part.name] = flight
+        return heavy
+
+    parts = [Part("column", airframe=False), Part("wheel", airframe=False)]
+    air = Part("column", own=False)
+    assert list(_airframe_first([*parts, air], work, lambda rig: rig)) == [air, *parts]
+    assert given == {"airframe": None, "column": heavy.flight, "wheel": heavy.flight}
+
+
+@pytest.mark.slow
+def test_a_late_clock_of_the_motion_is_of_no_control() -> None:
+    found = diagnose(cessna(), {"r": short(("flight.motion_stamp_s", 0.1))})
+    (effect,) = found.effects
+    assert (effect.name, effect.stage, effect.control) == ("motion_skew", "sensing", None)
+    assert "sensing" in found.guilty
+
+
 @pytest.mark.slow
 def test_another_weight_is_not_put_down_to_the_surfaces() -> None:
     """The heavier aircraft trims at another elevator, which is no fault of the rigging."""
@@ -272,10 +295,11 @@ def test_another_weight_is_not_put_down_to_the_surfaces() -> None:
 
 @pytest.mark.slow
 def test_beside_healthy_records_each_part_has_its_own_reference() -> None:
-    healthy = {str(i): flown(cessna(), {}, pedals=PEDALS_N + i) for i in range(3)}
+    healthy = {str(i): flown(cessna(), {}, SHORT_s, pedals=float(i)) for i in range(3)}
     found = diagnose(cessna(), {"r": short(*WORN.items())}, healthy=healthy)
     assert {"wheel.linkage", "airframe"} <= {*found.guilty}
-    assert set(found.as_dict()["healthy"]) == {*CONTROL_NAMES, "airframe"}
+    assert set(found.as_dict()["healthy"]) == {"column", "wheel", "airframe"}
+    assert "No healthy record moves the pedals" in found.summary
 
 
 @pytest.mark.slow
