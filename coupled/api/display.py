@@ -24,11 +24,13 @@ from coupled.campaign.sweep import SweepResult
 from coupled.errors import InputError
 from coupled.exporting.write import Export
 from coupled.files import check_target, write_text
-from coupled.gap.findings.diagnosis import Diagnosis
+from coupled.gap.findings.diagnosis import Diagnosis, PartDiagnosis
+from coupled.gap.findings.whole import WholeDiagnosis
 from coupled.gap.nominalfit import NominalFit
 from coupled.plots.checks import draw_static_checks
 from coupled.plots.fits import draw_fit
 from coupled.plots.flights import draw_comparison
+from coupled.plots.gaps import shown_parts
 from coupled.plots.gapview import View
 from coupled.plots.histories import Figure, draw_record
 from coupled.plots.ladder import draw_ladder
@@ -80,6 +82,11 @@ def _diagnosed(found: Diagnosis, made: Made) -> Report:
     return diagnosis_report(found, ", ".join(Path(name).name for name in found.records), made)
 
 
+_DIAGNOSIS = _Way(
+    _diagnosed,
+    lambda found: draw_ladder(View(shown_parts(found)[0])),
+    rig=lambda found: found.nominal,
+)
 DISPLAYS: dict[type, _Way] = {
     Rig: _Way(rig_report, draw_rig, rig=lambda rig: rig),
     Record: _Way(record_report, draw_record, 1),
@@ -90,9 +97,8 @@ DISPLAYS: dict[type, _Way] = {
         3,
         lambda found: found[0].manoeuvre.rig,
     ),
-    Diagnosis: _Way(
-        _diagnosed, lambda found: draw_ladder(View(found)), rig=lambda found: found.nominal
-    ),
+    PartDiagnosis: _DIAGNOSIS,
+    WholeDiagnosis: _DIAGNOSIS,
     NominalFit: _Way(fit_report, draw_fit, rig=lambda found: found.rig),
     SweepResult: _Way(sweep_report, draw_result),
     CheckResult: _Way(check_report, draw_verdicts),

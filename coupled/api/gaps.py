@@ -21,7 +21,7 @@ from coupled.rig.rig import Rig
 def diagnose(
     rig: Rig | str | PathLike[str] | None,
     records: Given | Sequence[Given] | Mapping[str, Given],
-    control: ControlName = "column",
+    control: ControlName | None = None,
     progress: Callable[[str, int, int], None] | None = None,
     healthy: Given | Sequence[Given] | Mapping[str, Given] | None = None,
     terms: bool = False,
@@ -32,15 +32,18 @@ def diagnose(
     one; None for that of the manifest beside the records. Its aircraft is trimmed as the records
     begin. `records` is one record or several of that rig, as `Record`, as a DataFrame, as files, or
     by name; each needs `time_s` and what its stages need (force and deflections of the control, q̄).
-    `healthy` are records of the machine when it was well; what differs from those is judged. With
-    `terms`, the named functions of the model's aerodynamics are tried in place of the effects that
-    scale its aerodynamics: the effect `term NAME` is a factor on the function NAME.
+    `control` restricts it to one; None judges every control that rig and records have and that
+    moves. `healthy` are records of the machine when it was well; what differs from those is judged.
+    With `terms`, the named functions of the model's aerodynamics are tried in place of the effects
+    that scale its aerodynamics: the effect `term NAME` is a factor on the function NAME.
 
     `found.verdict` is `no_gap`, `effect`, `mostly`, `ambiguous` or `unexplained`;
     `found.effects` are the effects, each with its parameters, their values and 95 % intervals;
     `found.budget` shares each guilty stage's residual out to them, to what no effect explains,
     and to noise; `found.improved` is the rig with them; `found.as_dict()` the JSON of the command
-    line. Raises InputError where records and rig cannot be held against each other.
+    line. `found.controls` are the judged controls; of several, an effect has its `control`, and
+    `found.parts` are the diagnoses of each control and of the airframe. Raises InputError where
+    records and rig cannot be held against each other.
 
     >>> import coupled
     >>> rig = coupled.load_rig("t37")

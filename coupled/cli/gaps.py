@@ -11,12 +11,12 @@ from coupled.cli.app import JsonOption, UnitsOption, WideOption, app, check_clus
 from coupled.cli.held import RECORDS, check_rig_target, files_read, read_each
 from coupled.cli.progress import progress
 from coupled.cli.reporting import ReportOption, check_report, say_report, write_report
-from coupled.cli.rigs import ControlOption, say_guesses
+from coupled.cli.rigs import say_guesses
 from coupled.cli.terminal import check_json, keep_json, out, print_json, say
 from coupled.errors import InputError, shown
 from coupled.files import check_target, check_targets, write_text
 from coupled.outputs import Outputs
-from coupled.record.channels import ControlName, control_named
+from coupled.record.channels import CONTROL_NAMES, ControlName, control_named
 from coupled.resources import find, shipped_rigs
 
 if TYPE_CHECKING:
@@ -45,7 +45,9 @@ def diagnose(
             " beside the record)"
         ),
     ] = "",
-    control: ControlOption = "column",
+    control: Annotated[
+        str, typer.Option(help="One control only. (default: all that the records move)")
+    ] = "",
     healthy: Annotated[
         list[Path] | None,
         typer.Option(
@@ -59,7 +61,11 @@ def diagnose(
     ] = None,
     plots: Annotated[
         Path | None,
-        typer.Option(metavar="DIR", help="Draw the figures ladder, stages and signature there."),
+        typer.Option(
+            metavar="DIR",
+            help="Draw the figures ladder, stages and signature there; of several controls, those"
+            " of each with a gap, and of the airframe.",
+        ),
     ] = None,
     terms: Annotated[
         bool,
@@ -92,7 +98,7 @@ def diagnose(
     wide: WideOption = False,
 ) -> None:
     """Find where records depart from their rig, the effect behind it, and how much it explains."""
-    name = control_named(control, records[0])
+    name = control_named(control, records[0]) if control else None
     if any(record.is_dir() for record in records):
         asked = {"--improve": improve, "--plots": plots, "--power": power, "--healthy": healthy}
         asked["--terms"] = terms
@@ -115,14 +121,14 @@ def diagnose(
     targets += check_report(report, [*inputs, *targets], plots)
     check_json(json_file, [*inputs, *targets])
     whole, read = _diagnose(records, rig_file, name, healthy or [], terms)
-    note = say_guesses(whole.nominal, (name,))
+    note = say_guesses(whole.nominal, whole.controls)
     worse = improve is not None and not whole.improves
     table = whole.as_dict(power) if json_file else {}
     with progress("drawing and writing"), Outputs() as outputs:
         if improve is not None and not worse:
             _write_improved(outputs.at(improve), whole, rig_file, read)
         if plots is not None:
-            _draw(outputs.folder(plots), whole, note, units)
+            drawn = [plots / one for one in _draw(outputs.folder(plots), whole, note, units)]
         keep_json(table, json_file, outputs)
         _report(report, outputs, inputs, (whole, power, note, units))
     if json_file != "-":
@@ -145,7 +151,7 @@ def _refuse_for_folders(records: list[Path], asked: dict[str, object]) -> None:
 def _diagnose(
     files: list[Path],
     rig_file: Path | None,
-    control: ControlName,
+    control: ControlName | None,
     healthy: list[Path],
     terms: bool,
 ) -> tuple[Diagnosis, dict[str, Record]]:
@@ -226,7 +232,7 @@ def _write_improved(
         text = read_text(rig_file, "a rig file is wanted")
     remark = f"{held} with what was found in {names}:\n{whole.summary}\n"
     for effect in whole.effects:
-        remark += "".join(f"changed: {p.key} {change(p)}\n" for p in effect.parameters)
+        remark += "".join(f"changed: {effect.key_of(p)} {change(p)}\n" for p in effect.parameters)
     for setting in (one for one in whole.settings if one.moved):
         remark += f"changed: {setting.words}, within its tolerance\n"
     remark += "".join(f"{sentence}\n" for sentence in outdated_bends(filed, whole.improved))
@@ -243,12 +249,13 @@ def _write_improved(
 
 
 def _plot_targets(folder: Path | None) -> list[Path]:
-    """Return the files that a diagnosis draws into a folder."""
+    """Return the files that a diagnosis may draw into a folder."""
     if folder is None:
         return []
-    from coupled.plots.gaps import FIGURES
+    from coupled.gap.chain import AIRFRAME
+    from coupled.plots.gaps import figure_files
 
-    return [folder / name for name in FIGURES]
+    return [folder / name for name in figure_files(["", *CONTROL_NAMES, AIRFRAME])]
 
 
 def _report(
@@ -273,22 +280,25 @@ def _report(
     )
 
 
-def _draw(folder: Path, whole: Diagnosis, note: str, units: System) -> None:
+def _draw(folder: Path, whole: Diagnosis, note: str, units: System) -> list[str]:
+    """Draw the figures of a diagnosis into a folder; return their files' names."""
     from coupled.plots.gaps import draw_diagnosis
     from coupled.plots.saving import save
 
-    for file, figure in draw_diagnosis(whole, units).items():
+    figures = draw_diagnosis(whole, units)
+    for file, figure in figures.items():
         save(figure, folder / file, note)
+    return list(figures)
 
 
 def _diagnose_folder(
     folders: list[Path],
     rig: str,
     output: Path | None,
-    control: ControlName,
+    control: ControlName | None,
     place: tuple[int, str],
 ) -> None:
-    """Diagnose a control in each record of a folder; print and write a summary."""
+    """Diagnose each record of a folder, or a control in each; print and write a summary."""
     from coupled.cli.tables import print_table
     from coupled.gap.batch import LIST, jobs, run_all, summary
     from coupled.record.record import manifest_path

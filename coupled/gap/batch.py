@@ -22,7 +22,7 @@ from coupled.errors import InputError, collected, nearest, together
 from coupled.files import check_target, json_text, read_json, sha256, write_text
 from coupled.gap.diagnose import diagnose
 from coupled.gap.findings.document import diagnosis_from
-from coupled.gap.findings.result import FORMAT
+from coupled.gap.findings.result import FORMAT, placed
 from coupled.parallel import as_done, cores, executor
 from coupled.record.channels import ControlName
 from coupled.record.record import Record, read_record
@@ -40,16 +40,16 @@ _AHEAD = 4  # records that wait for each worker
 
 @dataclass(frozen=True)
 class Job:
-    """One record, its rig, where its diagnosis goes, and the control that is diagnosed."""
+    """One record, its rig, where its diagnosis goes, and the control; None for all that move."""
 
     name: str
     record: Path
     rig: Path
     out: Path
-    control: ControlName = "column"
+    control: ControlName | None = None
 
 
-def jobs(folder: Path, out: Path, control: ControlName = "column") -> list[Job]:
+def jobs(folder: Path, out: Path, control: ControlName | None = None) -> list[Job]:
     """Return what a folder's `records.toml` asks for: record = rig.
 
     Records lie beside it or in `records/`, rigs in `rigs/` there or a folder up, else among
@@ -67,7 +67,7 @@ def jobs(folder: Path, out: Path, control: ControlName = "column") -> list[Job]:
     return found
 
 
-def _job(folder: Path, out: Path, name: str, rig: object, control: ControlName) -> Job:
+def _job(folder: Path, out: Path, name: str, rig: object, control: ControlName | None) -> Job:
     if not isinstance(rig, str):
         raise InputError(folder / LIST, name, "needs the name of a rig, in quotes")
     if not re.match(PLAIN_NAME, name):
@@ -122,7 +122,7 @@ class Row:
             record=job.name,
             rig=job.rig.stem,
             verdict=kept.verdict,
-            effects=tuple(effect.name for effect in kept.effects),
+            effects=tuple(placed(effect.name, effect.control) for effect in kept.effects),
             parameters=tuple(
                 (name, one.value)
                 for e in kept.effects
@@ -168,7 +168,7 @@ def made_by(job: Job) -> dict[str, str]:
         "record_sha256": sha256(job.record),
         "rig": job.rig.stem,
         "rig_sha256": sha256(job.rig),
-        "control": job.control,
+        "control": job.control or "all",
     }
 
 
@@ -186,7 +186,7 @@ def known_row(job: Job, made: Mapping[str, str]) -> Row | None:
 
 
 def answer(
-    number: int, rig: Rig, name: str, record: Record, control: ControlName
+    number: int, rig: Rig, name: str, record: Record, control: ControlName | None
 ) -> tuple[int, str, dict[str, Any]]:
     """Return a job's number, the version that did it, and the JSON of the diagnosis.
 
@@ -228,7 +228,7 @@ def run_all(todo: list[Job], progress: Progress, workers: int = 0, cluster: str 
         found[number] = _keep(todo[number], made[number], answered)
         progress(todo[number].name, len(found), len(todo))
 
-    def calls() -> Iterator[tuple[int, Rig, str, Record, ControlName]]:
+    def calls() -> Iterator[tuple[int, Rig, str, Record, ControlName | None]]:
         for number, job in enumerate(todo):
             row = known_row(job, made[number])
             if row is not None:

@@ -6,7 +6,10 @@ the stages are in `stages` and `airframe`.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+
+from coupled.record.channels import ControlName
 
 
 @dataclass(frozen=True)
@@ -46,6 +49,40 @@ CHAIN: tuple[Stage, ...] = (
 )
 BY_NAME = {stage.name: stage for stage in CHAIN}
 STAGES = tuple(BY_NAME)
+AIRFRAME = "airframe"
+OF_FLIGHT = "flight."  # how the keys of the aircraft start in a rig file
+
+
+@dataclass(frozen=True)
+class Part:
+    """The stages that one search judges: a control's `own`, the airframe, or both.
+
+    If the records move one control, they are one part. If they move several, the stages of each
+    control up to its surface are a part, and the airframe, which all of them move, is another. Its
+    `control` is the first; sizes of the aircraft's effects are compared in regimes of its motion.
+    """
+
+    control: ControlName
+    own: bool = True
+    airframe: bool = True
+
+    @property
+    def name(self) -> str:
+        """The control, or `airframe`."""
+        return self.control if self.own else AIRFRAME
+
+    def judges(self, stage: str) -> bool:
+        """Tell whether a stage belongs to the part."""
+        return self.airframe if stage == AIRFRAME else self.own
+
+    def frees(self, keys: Iterable[str]) -> bool:
+        """Tell whether an effect that frees these keys of a rig file is tried in the part."""
+        of_flight = all(key.startswith(OF_FLIGHT) for key in keys)
+        return self.airframe if of_flight else self.own
+
+    def owner(self, stage: str) -> ControlName | None:
+        """Return the control of a stage; None for the airframe and the sensors of its motion."""
+        return self.control if self.own and stage != AIRFRAME else None
 
 
 def stage_of(output: str) -> str:

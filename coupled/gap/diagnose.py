@@ -12,34 +12,41 @@ half of the gap.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
+from typing import TypeVar
 
+from coupled.gap.chain import Part
 from coupled.gap.findings.answer import effects_of, incredible, settings_of, verdict_of
 from coupled.gap.findings.budget import stage_budget
-from coupled.gap.findings.diagnosis import Diagnosis
+from coupled.gap.findings.diagnosis import Diagnosis, PartDiagnosis
 from coupled.gap.findings.healthy import Baseline, beside_healthy
 from coupled.gap.findings.inseparable import inseparable
 from coupled.gap.findings.judge import Judge
+from coupled.gap.findings.result import StageResult
 from coupled.gap.findings.shrink import floors_of, shrink
+from coupled.gap.findings.whole import WholeDiagnosis
+from coupled.gap.parts import moves, parts_of
 from coupled.gap.prepare import Prepared, prepare
 from coupled.gap.search.case import Case, Tell
 from coupled.gap.search.descent import Descent
 from coupled.gap.search.found import Choice
 from coupled.gap.search.histories import search
 from coupled.gap.search.problem import Problem
-from coupled.parallel import threads
+from coupled.parallel import in_threads, threads
 from coupled.record.channels import ControlName
 from coupled.record.record import Record
+from coupled.rig.parameters import Flight
 from coupled.rig.rig import Rig
 
 __all__ = ["Diagnosis", "diagnose"]
+T = TypeVar("T")
 
 
 def diagnose(
     rig: Rig,
     records: Mapping[str, Record],
-    control: ControlName = "column",
+    control: ControlName | None = None,
     tell: Tell | None = None,
     healthy: Mapping[str, Record] | None = None,
     workers: int = 0,
@@ -47,31 +54,86 @@ def diagnose(
 ) -> Diagnosis:
     """Return the diagnosis of records of one rig, by their files' names.
 
-    `tell` is called with the present task, and the numbers of tasks done and in all. With records
-    of the `healthy` machine, the change since then is judged. `workers` is the number of threads, 0
-    for one per core; the result does not depend on it. With `terms`, the named functions of the
-    model's aerodynamics are tried. Raises InputError if a record cannot be of this rig, or if no
+    It judges one control, or all that the records move, and the airframe. `tell` is called with the
+    present task, and the numbers of tasks done and in all. With records of the `healthy` machine,
+    the change since then is judged. `workers` is the number of threads, 0 for one per core; the
+    result does not depend on it. With `terms`, the named functions of the model's aerodynamics are
+    tried. Raises InputError if a record cannot be of this rig, or if no
     stage can be judged.
     """
     with threads(workers):
-        baseline = None
-        if healthy:
-            well = prepare(rig, healthy, control, tell, terms=terms)
-            case, found = search(well.case, well.library)
-            baseline = Baseline.of(well.records, case, found.fit)
-        prepared = prepare(rig, records, control, tell, baseline, terms)
-        return findings(prepared, *search(prepared.case, prepared.library))
+        parts, words = parts_of(rig, records, control)
+        well = _of_parts(rig, healthy, list(parts)) if healthy else {}
+        alone = [part.name for part in parts if healthy and part not in well]
+        words += tuple(f"No healthy record moves the {n}; noise is the limit." for n in alone)
+
+        def reference(part: Part, flight: Flight | None) -> Baseline:
+            made = prepare(rig, well[part], part, _told(tell, part, parts), None, flight, terms)
+            case, found = search(made.case, made.library)
+            return Baseline.of(made.records, case, found.fit)
+
+        baselines = _airframe_first(list(well), reference, lambda known: known.rig)
+
+        def diagnosed(part: Part, flight: Flight | None) -> PartDiagnosis:
+            told, baseline = _told(tell, part, parts), baselines.get(part)
+            made = prepare(rig, parts[part], part, told, baseline, flight, terms)
+            return findings(made, *search(made.case, made.library))
+
+        found = _airframe_first(list(parts), diagnosed, lambda known: known.improved)
+        made = [found[part] for part in parts]
+        each = [replace(one, left_out=(*one.left_out, *words)) for one in made]
+    if len(each) == 1:
+        return each[0]
+    judged = {file: one for part in each for file, one in part.records.items()}
+    return WholeDiagnosis.of(each, {file: judged[file] for file in records if file in judged})
 
 
-def findings(prepared: Prepared, case: Case, choice: Choice) -> Diagnosis:
+def _airframe_first(
+    parts: Sequence[Part],
+    work: Callable[[Part, Flight | None], T],
+    rig_of: Callable[[T], Rig],
+) -> dict[Part, T]:
+    """Return the results of parts: of the airframe, and then of the controls side by side.
+
+    The controls are given the aircraft with what was found in it, since the trim positions of their
+    surfaces depend on it.
+    """
+    found = {part: work(part, None) for part in parts if not part.own}
+    flight = next((rig_of(known).flight for known in found.values()), None)
+    rest = [part for part in parts if part.own]
+    return found | dict(zip(rest, in_threads(lambda part: work(part, flight), rest), strict=True))
+
+
+def _of_parts(
+    rig: Rig, records: Mapping[str, Record], parts: Sequence[Part]
+) -> dict[Part, Mapping[str, Record]]:
+    """Return the healthy records of each part; a control that none of them moves has none."""
+    if len(parts) == 1:
+        return {parts[0]: records}
+    found = {
+        part: {f: r for f, r in records.items() if not part.own or moves(rig, r, part.control)}
+        for part in parts
+    }
+    return {part: ours for part, ours in found.items() if ours}
+
+
+def _told(tell: Tell | None, part: Part, parts: Collection[Part]) -> Tell | None:
+    """Return the progress of one of several parts, whose tasks name the part."""
+    if tell is None or len(parts) == 1:
+        return tell
+    return lambda what, done, total: tell(f"{part.name}: {what}", done, total)
+
+
+def findings(prepared: Prepared, case: Case, choice: Choice) -> PartDiagnosis:
     """Return the diagnosis from a search; `case` has the final noise floors."""
     rig, control, readers = case.nominal, case.control, prepared.readers
+    part = prepared.part
     outputs = list(case.outputs)
     judge = Judge(readers, outputs, choice, case.gaps(choice.fit.rig))
-    stages = judge.stages()
+    stages = _of_part(part, judge.stages())
     effects = effects_of(case, choice, readers, stages)
     if unsure := incredible(choice, effects):
-        stages = replace(judge, doubted=unsure).stages()
+        stages = _of_part(part, replace(judge, doubted=unsure).stages())
     own, found = Descent("own"), choice.fit
     fitted = Problem(case).fit(found.effects, found.values, descent=own, part="fitted")
     floors = floors_of(case, choice)
@@ -82,11 +144,14 @@ def findings(prepared: Prepared, case: Case, choice: Choice) -> Diagnosis:
     ]
     budget = tuple(one for one in budgets if one is not None)
     baseline, records = prepared.baseline, list(prepared.records.values())
-    change = None if baseline is None else baseline.compared(records, prepared.case.outputs)
+    outputs_now = prepared.case.outputs
+    change = None if baseline is None else baseline.compared(records, outputs_now, part.own)
     verdict = verdict_of(choice, stages, effects, budget)
     verdict, stages = beside_healthy(verdict, stages, baseline, change)
-    return Diagnosis(
-        control=control,
+    filtered = (one.filtered().items() for one in readers) if part.own else ()
+    return PartDiagnosis(
+        part=part,
+        control=part.name,
         verdict=verdict,
         stages=stages,
         effects=effects,
@@ -106,7 +171,12 @@ def findings(prepared: Prepared, case: Case, choice: Choice) -> Diagnosis:
         baseline=baseline,
         change=change,
         trim=prepared.trim,
-        filtered={name: one for reader in readers for name, one in reader.filtered().items()},
+        filtered={name: one for each in filtered for name, one in each},
         left_out=prepared.left_out,
         inseparable=inseparable(choice.fit),
     )
+
+
+def _of_part(part: Part, stages: Sequence[StageResult]) -> tuple[StageResult, ...]:
+    """Return the stages that a part judges; of the airframe alone, faulty sensors of the motion."""
+    return tuple(one for one in stages if part.judges(one.name) or (one.guilty and not part.own))

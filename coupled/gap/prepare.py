@@ -11,8 +11,9 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 
 from coupled.errors import InputError
+from coupled.gap.chain import AIRFRAME, Part
 from coupled.gap.checks import check_record, check_trim
-from coupled.gap.effects.effect import Effect
+from coupled.gap.effects.effect import Effect, keys_of
 from coupled.gap.effects.library import library_of
 from coupled.gap.findings.healthy import Baseline
 from coupled.gap.search.case import Case, Tell
@@ -33,18 +34,20 @@ from coupled.gap.trimmed import trim_speed, trimmed
 from coupled.parallel import in_threads
 from coupled.record.channels import ControlName
 from coupled.record.record import Record
+from coupled.rig.parameters import Flight
 from coupled.rig.rig import Rig
 
 
 @dataclass(frozen=True)
 class Prepared:
-    """Prepared records of one control of a rig.
+    """Prepared records of one part of a diagnosis.
 
     `case` holds the rig and the outputs, `library` the effects that can be tried. `trim` and
     `left_out` are sentences for the report: the trim that was taken from the records, and what of
     the records is not judged. `baseline` is the healthy machine, if it is known.
     """
 
+    part: Part
     case: Case
     library: tuple[Effect, ...]
     readers: tuple[Reader, ...]
@@ -57,19 +60,24 @@ class Prepared:
 def prepare(
     rig: Rig,
     records: Mapping[str, Record],
-    control: ControlName = "column",
+    part: Part,
     tell: Tell | None = None,
     baseline: Baseline | None = None,
+    flight: Flight | None = None,
     terms: bool = False,
 ) -> Prepared:
-    """Return records prepared for a diagnosis, by their files' names.
+    """Return records prepared for the diagnosis of a part, by their files' names.
 
     With `terms`, the named functions of the model's aerodynamics are tried (`stages.terms`).
     With a `baseline`, the rig is that of the healthy machine, and its model error raises the noise
-    floors. Raises InputError if a record cannot be of this rig, or if no stage can be judged.
+    floors. `flight` is the aircraft with what was found in it before. Raises InputError if a record
+    cannot be of this rig, or if no stage can be judged.
     """
     if baseline is not None:
         rig = baseline.rig
+    if flight is not None:
+        rig = rig.changed({"flight": flight})
+    control = part.control
     live = [one for one in map(live_of, records.values()) if one is not None]
     records = {file: judged_part(record, file) for file, record in records.items()}
     if not rig.controls:
@@ -78,14 +86,14 @@ def prepare(
     rig = as_driven(rig, list(records.values()), control) if control in rig.controls else rig
     rig, trim = trimmed(rig, records)
     for file, record in records.items():
-        check_record(rig, record, control, file)
+        check_record(rig, record, control, file, moved=part.own)
         if rig.flight is not None:
             check_trim(trim_speed(rig), record, file)
     if rig.controls:
         rig = as_counted(rig, list(records.values()), control)
     else:
         check_moved_by_pilot(rig)
-    judged = Judged(rig, readers_of(rig, records, control), baseline)
+    judged = Judged(rig, part, readers_of(rig, records, control), baseline)
     outputs = [
         allowing_for_contact(output.halved(rig), rig, control) for output in judged.under(rig)
     ]
@@ -94,11 +102,12 @@ def prepare(
     left_out = [words for one in live for words in one.left_out]
     if any(output.stage == "airframe" for output in outputs):
         left_out += [words for words in [not_judged(list(records.values()))] if words]
-    library = library_of(rig, control)
-    library = tried_effects(
-        with_terms(library, rig, records) if terms else library, judged.readers, outputs
-    )
+    library = [one for one in library_of(rig, control) if part.frees(keys_of([one]))]
+    if terms and part.airframe:
+        library = with_terms(library, rig, records)
+    library = tried_effects(library, judged.readers, outputs)
     return Prepared(
+        part,
         Case(rig, control, outputs, tell, judged.under, model_error_in_floors=baseline is not None),
         tuple(library),
         tuple(judged.readers),
@@ -124,6 +133,7 @@ class Judged:
     """
 
     rig: Rig
+    part: Part
     readers: Sequence[Reader]
     baseline: Baseline | None = None
     _flights: dict[int, Flights] = field(default_factory=dict, repr=False, compare=False)
@@ -140,16 +150,17 @@ class Judged:
 
     def _made(self, rig: Rig) -> list[Output]:
         readers = [replace(reader, rig=rig) for reader in self.readers]
-        makers: list[Callable[[], list[Output]]] = [reader.outputs for reader in readers]
+        own = readers if self.part.own else []
+        makers: list[Callable[[], list[Output]]] = [reader.outputs for reader in own]
         alike = bool(self._known) and _has_same_flight(self.rig, rig)
-        for one in () if alike else readers:
+        for one in readers if self.part.airframe and not alike else []:
             flights = self._flights.setdefault(one.number, Flights())
             makers.append(partial(airframe_outputs, one.rig, one.record, one.number, flights))
         made = [output for each in in_threads(lambda make: make(), makers) for output in each]
         if alike:
             made += self._flown
         elif rig == self.rig:
-            self._flown[:] = [output for output in made if output.stage == "airframe"]
+            self._flown[:] = [output for output in made if output.stage == AIRFRAME]
         return made if self.baseline is None else self.baseline.raised(made)
 
 

@@ -16,6 +16,10 @@ STAMP_JITTER = 0.01  # chosen: of a frame, by which a row's time may be off
 SHORTEST_RECORD_s = 5.0  # two stretches of 2.5 s: one to fit, one to hold out
 SHORT_SWINGS = 4  # of a shorter record: both halves then hold motion in both directions
 
+# The controls that a record moves (`parts`).
+MOVES_NOISE = 2.0  # chosen: least standard deviation of a motion, over the noise's
+MOVES_LEAST = 1e-3  # chosen: and over the travel of the control
+
 # Noise and rounding of a channel (`output`).
 SOURCE_FRAMES = 12  # chosen: delays over which noise is regressed on its source
 ROUNDED = 3.0  # of the noise, above which even steps are those of a ramp, not of rounding

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import Any
 
 from coupled.errors import InputError
@@ -153,5 +154,11 @@ def trim_speed(rig: Rig) -> float:
     """Return the true airspeed at which the rig's aircraft is trimmed, m/s."""
     assert rig.flight is not None
     still = changed(rig.flight, STILL, rig.name, "flight")
-    airframe = make_aircraft(still, 1.0 / rig.frame_rate, ["column"], [aircraft_folder()])
+    return _trim_speed(still.model_dump_json(), rig.frame_rate)
+
+
+@lru_cache(maxsize=64)
+def _trim_speed(flight: str, rate_Hz: float) -> float:
+    still = Flight.model_validate_json(flight)
+    airframe = make_aircraft(still, 1.0 / rate_Hz, ["column"], [aircraft_folder()])
     return airframe.motion()[motion_channels(["column"], flown=True).index(SPEED)]

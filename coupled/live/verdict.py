@@ -31,7 +31,7 @@ def diagnosed(flight: LiveFlight) -> dict[str, Any]:
             known = one.low is not None and one.high is not None
             interval = f"{one.low:.4g} to {one.high:.4g}" if known else ""
             shown = f"{one.name} = {one.value:.4g}"
-            rows.append([effect.name, effect.stage, shown, interval, f"{effect.probability:.2f}"])
+            rows.append([effect.name, effect.place, shown, interval, f"{effect.probability:.2f}"])
     judged = f"Judged from {start_s:g} s on, with the switches as they stood. " if start_s else ""
     return {
         "verdict": found.verdict,

@@ -11,11 +11,10 @@ import numpy as np
 from coupled.display import Shown, System, drawn
 from coupled.gap.chain import stage_of
 from coupled.gap.effects.effect import Effect
-from coupled.gap.findings.diagnosis import Diagnosis
+from coupled.gap.findings.diagnosis import PartDiagnosis
 from coupled.gap.findings.result import StageResult
 from coupled.gap.findings.summary import plain
 from coupled.gap.prepare import readers_of
-from coupled.gap.search.case import Case
 from coupled.gap.signals.output import Floats, Output
 from coupled.gap.stages.stages import Reader
 from coupled.gap.thresholds import FAULTY_FROM
@@ -78,7 +77,7 @@ def style_of(kind: str) -> dict[str, Any]:
 class View:
     """A diagnosis and its records, as the figures ask for it, and the units that they have."""
 
-    diagnosis: Diagnosis
+    diagnosis: PartDiagnosis
     system: System = "si"
 
     @property
@@ -103,9 +102,7 @@ class View:
             return whole.nominal
         if set(effects) == set(self.effects):
             return whole.improved
-        return Case(whole.nominal, whole.control, whole.outputs).with_only(
-            whole.choice.fit, effects
-        )
+        return whole.rig_with(effects)
 
     def rungs(self) -> list[tuple[str, Rig]]:
         """Return the rigs from the nominal one to the improved, an effect more at a time."""
@@ -139,7 +136,7 @@ class View:
 
     def readers(self, rig: Rig) -> list[Reader]:
         """Return what reads the stages' inputs off each record."""
-        return readers_of(rig, self.diagnosis.records, self.diagnosis.control)
+        return readers_of(rig, self.diagnosis.records, self.diagnosis.part.control)
 
     def time(self, output: Output) -> Floats:
         """Return the time of an output's frames, in s from the record's start."""

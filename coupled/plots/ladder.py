@@ -170,7 +170,7 @@ def _screened(view: View, tried: dict[str, float], gaps: dict[str, float]) -> li
         if effect.name not in tried
         and effect.name not in known
         and guilty & {stage_of(output) for output in effect.shows_in}
-        and effect.can_be_tried(view.records, view.diagnosis.control)
+        and effect.can_be_tried(view.records, view.diagnosis.part.control)
     ]
 
 

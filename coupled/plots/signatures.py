@@ -201,7 +201,7 @@ def _draw_zoom(
 
 def _input(view: View, output: Output) -> tuple[str, Floats] | None:
     """Return what drives an output's stage, where the record has it."""
-    control, record = view.diagnosis.control, view.records[output.record]
+    control, record = view.diagnosis.part.control, view.records[output.record]
     label, name = STAGE_OF[output.stage].drive if output.stage in STAGE_OF else ("", "")
     name = f"{control}_force_N" if name == "force" else name
     if name not in record:

@@ -56,7 +56,7 @@ def _draw_against(axes: Any, signal: Floats, left: Floats, label: str, unit: Sho
 
 def _signals(view: View, output: Output) -> list[tuple[str, Floats]]:
     """Return the signals that a residual may go with, each with its label."""
-    record, control = view.records[output.record], view.diagnosis.control
+    record, control = view.records[output.record], view.diagnosis.part.control
     d = unit_of(control)
     found: list[tuple[str, Floats]] = []
     for name in (f"{control}_force_N", f"{control}_computed_{d}", "dynamic_pressure_Pa"):

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from coupled.display import System
 from coupled.gap.findings.diagnosis import Diagnosis
 from coupled.gap.findings.summary import sentences, summary_in
-from coupled.plots.gaps import draw_diagnosis
+from coupled.plots.gaps import drawn_parts
 from coupled.plots.saving import svg_text
 from coupled.reports.page import Drawing, Made, Report, Section, Verdict
 from coupled.tables.gaps import (
@@ -35,12 +35,13 @@ def diagnosis_report(
 ) -> Report:
     """Return the report; with the least sizes that would have shown, where they are asked for."""
     sections = [Section(head, tables) for head, tables in _tables(whole, with_power, system)]
-    drawn = draw_diagnosis(whole, system)
-    figures = (Drawing(svg_text(each), _CAPTIONS[name]) for name, each in drawn.items())
-    sections.append(Section("Figures", tuple(figures)))
+    for part, drawn in drawn_parts(whole, system).items():
+        figures = (Drawing(svg_text(each), _CAPTIONS[name]) for name, each in drawn.items())
+        head = f"Figures: {part}" if len(whole.parts) > 1 else "Figures"
+        sections.append(Section(head, tuple(figures)))
     settings = (
         ("rig", whole.nominal.name),
-        ("control" if whole.nominal.controls else "stage", whole.subject),
+        ("controls" if whole.controls else "stage", ", ".join(whole.controls) or whole.subject),
         ("records", f"{len(whole.records)}, {_seconds(whole):.4g} s in all"),
     )
     return Report("Diagnosis", title, _verdict(whole, system), tuple(sections), settings, made)

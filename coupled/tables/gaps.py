@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from coupled.display import Shown, System, drawn, percent, split_unit
 from coupled.gap.findings.budget import StageBudget, share_of
-from coupled.gap.findings.result import EffectResult, ParameterEstimate, StageResult
+from coupled.gap.findings.result import EffectResult, ParameterEstimate, StageResult, labelled
 from coupled.gap.findings.summary import change, figure, in_units, labels, plain, size_in
 from coupled.tables.table import NONE, Mark, Row, Table
 
@@ -51,12 +51,12 @@ def effects_table(
 
 def _effect(effect: EffectResult, budget: Sequence[StageBudget], system: System) -> Iterator[Row]:
     """Yield a row for each parameter; share and probability are in the first."""
-    sure = (share_of(budget, effect.stage, effect.name), f"{effect.probability:.2f}")
+    sure = (share_of(budget, effect.place, effect.name), f"{effect.probability:.2f}")
     names = labels(effect)
     if not effect.parameters:
-        yield (plain(effect.name), "", "", *sure)
+        yield (effect.label, "", "", *sure)
     for i, parameter in enumerate(in_units(p, system) for p in effect.parameters):
-        name = f"{plain(effect.name)} {names[i]}" if i == 0 else f"  {names[i]}"
+        name = f"{effect.label} {names[i]}" if i == 0 else f"  {names[i]}"
         number = (change(parameter), parameter.interval(figure))
         yield (name.rstrip(), *number, *(("", "") if i else sure))
 
@@ -64,7 +64,7 @@ def _effect(effect: EffectResult, budget: Sequence[StageBudget], system: System)
 def keys_table(effects: Sequence[EffectResult], system: System = "si") -> Table:
     """Return the keys of the rig file that the effects change: filed value, found value."""
     rows = tuple(
-        (p.key, p.unit, "none" if p.filed is None else figure(p.filed), *_found(p))
+        (effect.key_of(p), p.unit, "none" if p.filed is None else figure(p.filed), *_found(p))
         for effect in effects
         for p in (in_units(each, system) for each in effect.parameters)
     )
@@ -123,7 +123,7 @@ def in_flight_table(effects: Sequence[EffectInFlight], system: System = "si") ->
     rows: list[Row] = []
     for one in effects:
         for i, (name, by) in enumerate(one.changes.items()):
-            first = ("", "") if i else (plain(one.name), percent(one.share, 0))
+            first = ("", "") if i else (labelled(one.name, one.control), percent(one.share, 0))
             label, unit = _channel(name, system)
             own = f"{100 * one.of_motion[name]:.3g} %"
             rows.append((*first, label, f"{unit.factor * by:.3g}", own))
@@ -140,7 +140,10 @@ def _channel(name: str, system: System) -> tuple[str, Shown]:
 
 def power_table(sizes: Sequence[EffectPower], system: System = "si") -> Table:
     """Return the least size of each effect that the records would have shown."""
-    rows = tuple((one.name, one.stage, _least(one, system)) for one in sizes)
+    rows = tuple(
+        (f"{one.control} {one.name}" if one.control else one.name, one.stage, _least(one, system))
+        for one in sizes
+    )
     return Table(("effect", "stage", "would have shown from"), rows, align="l", spare=("stage",))
 
 

@@ -19,8 +19,16 @@ from coupled.display import percent
 from coupled.flight.manoeuvre import Manoeuvre
 from tests.support.rigs import bench
 
-SLOW = {"AuthorityMap", "Diagnosis", "Export", "ForceDocument", "NominalFit", "Stability", "Survey"}
-SLOW |= {"ModelTerms", "CalibrationResult", "Comparison", "Flight", "Readings"}
+SLOW = {"AuthorityMap", "Export", "ForceDocument", "NominalFit", "Stability", "Survey"}
+SLOW |= {
+    "PartDiagnosis",
+    "WholeDiagnosis",
+    "ModelTerms",
+    "CalibrationResult",
+    "Comparison",
+    "Flight",
+    "Readings",
+}
 SWEEP = {
     "name": "bends",
     "run": "appendix-c",
@@ -28,11 +36,13 @@ SWEEP = {
     "vary": [{"key": "rig.controls.column.loader.bend_m_per_N", "values": [1e-5, 9e-5]}],
 }
 PULL = coupled.Clamp(deflection_m=0.02)
+SWEEP_10_N = coupled.FrequencySweep(force_N=10, duration_s=6)
 
 
 @cache
-def flight() -> Any:
-    return coupled.fly("t37", column=coupled.FrequencySweep(force_N=40, duration_s=6), duration_s=7)
+def flight(**others: coupled.Pilot) -> Any:
+    sweep = coupled.FrequencySweep(force_N=40, duration_s=6)
+    return coupled.fly("t37", column=sweep, **others, duration_s=7)
 
 
 def made(name: str, folder: Path) -> Any:
@@ -49,7 +59,8 @@ def made(name: str, folder: Path) -> Any:
         "Readings": lambda: coupled.bench(bench(), gradients=3, deflections=3),
         "CalibrationResult": lambda: coupled.calibrate(made("Readings", folder), bench()),
         "ReadingsPlan": lambda: coupled.plan(bench()),
-        "Diagnosis": lambda: coupled.diagnose("t37", flight().record),
+        "PartDiagnosis": lambda: coupled.diagnose("t37", flight().record),
+        "WholeDiagnosis": lambda: coupled.diagnose("t37", flight(wheel=SWEEP_10_N).record),
         "NominalFit": lambda: coupled.fit("t37", flight().record, ["loader.mass_kg"]),
         "AuthorityMap": lambda: coupled.map_authority("bench"),
         "Stability": lambda: coupled.stability("bench"),

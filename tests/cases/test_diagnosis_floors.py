@@ -181,7 +181,7 @@ def test_a_healthy_record_that_misses_its_rig_hides_no_change() -> None:
         (effect,) = found.effects
         assert effect.name in ("bend", "bend_hysteresis")
         assert effect.value == pytest.approx(CHANGED, rel=0.02), found.summary
-    assert found.baseline is not None
+    assert found.parts[0].baseline is not None
     assert found.as_dict()["healthy"]["errors"]["column_deflection_m"]["misses"] > 2.0
 
 

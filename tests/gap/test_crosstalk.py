@@ -34,7 +34,7 @@ def recorded(share: float) -> Record:
 
 @pytest.mark.slow
 def test_it_is_named_at_its_size() -> None:
-    found = diagnose(joined(APART), {"r.csv": recorded(SHARE)})
+    found = diagnose(joined(APART), {"r.csv": recorded(SHARE)}, "column")
     assert found.verdict == "effect"
     (effect,) = found.effects
     assert effect.name == "crosstalk"

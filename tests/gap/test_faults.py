@@ -121,7 +121,7 @@ def test_a_record_whose_diagnosis_fails_leaves_the_others_theirs(
     todo = jobs(folder_of(tmp_path, clean, "a", "b"), tmp_path / "out")
 
     def fails_on_the_first(
-        rig: Rig, records: dict[str, Record], control: ControlName, workers: int
+        rig: Rig, records: dict[str, Record], control: ControlName | None, workers: int
     ) -> Diagnosis:
         if next(iter(records)).endswith("a.csv"):
             raise ZeroDivisionError("division by zero")

@@ -12,10 +12,11 @@ import pytest
 from matplotlib.figure import Figure
 
 from coupled.display import System
+from coupled.gap.chain import Part
 from coupled.gap.diagnose import diagnose
 from coupled.gap.effects.effect import Effect, apply
 from coupled.gap.effects.library import BY_NAME, EFFECTS
-from coupled.gap.findings.diagnosis import Diagnosis
+from coupled.gap.findings.diagnosis import PartDiagnosis
 from coupled.gap.findings.flown import fly_force
 from coupled.gap.findings.result import EffectResult, ParameterEstimate, StageResult
 from coupled.gap.findings.shrink import ChannelShrink, Shrink
@@ -71,7 +72,7 @@ def case(folder: Path, flown: bool) -> Case:
     return nominal, record, (*reader.outputs(), *airframe_outputs(nominal, record))
 
 
-def diagnosis_of(case: Case, effects: list[Effect], rival: Effect | None = None) -> Diagnosis:
+def diagnosis_of(case: Case, effects: list[Effect], rival: Effect | None = None) -> PartDiagnosis:
     """Return the diagnosis that names these effects, whatever the record says."""
     nominal, record, outputs = case
     fitted = fit_of(nominal, effects)
@@ -81,7 +82,8 @@ def diagnosis_of(case: Case, effects: list[Effect], rival: Effect | None = None)
     gaps = stage_gaps(outputs, nominal)
     blamed = {effect.stage for effect in effects}
     held = ChannelShrink("column_computed_m", 1.0, 1.0, 1.0, 8)
-    return Diagnosis(
+    return PartDiagnosis(
+        part=Part("column"),
         control="column",
         verdict="effect" if effects else "no_gap",
         stages=tuple(StageResult(s, g, g, 1.2, 1.0, s in blamed) for s, g in gaps.items()),
@@ -173,7 +175,7 @@ def test_a_residual_that_nothing_explains_is_held_against_everything(tmp_path: P
     jumps = np.where(np.sin(record.time_s * 9.0) > 0.6, 2e-3, 0.0)
     data[:, at] += jumps - jumps.mean()  # a mean would be a zero that is off
     spoiled = Record(record.channels, data)
-    diagnosis = diagnose(nominal, {"r.csv": spoiled}, "column")
+    (diagnosis,) = diagnose(nominal, {"r.csv": spoiled}, "column").parts
     assert diagnosis.verdict == "unexplained"
     assert diagnosis.choice.rounds[0] == diagnosis.choice.tried
     figures = draw_diagnosis(diagnosis)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from coupled.errors import InputError
+from coupled.gap.chain import Part
 from coupled.gap.diagnose import diagnose
 from coupled.gap.prepare import prepare
 from tests.support.pendulum import WEIGHT_N, ANGLE_rad, moved, moved_rig
@@ -34,7 +35,9 @@ def test_a_weight_is_tried_only_where_it_is_no_spring_with_an_offset(
     most_rad: float, tried: bool
 ) -> None:
     """To 0.2 rad sin differs from a line by less than the model error of a right effect."""
-    known = prepare(moved_rig(), {"r": moved(seconds=6.0, most_rad=most_rad)}, "wheel").library
+    known = prepare(
+        moved_rig(), {"r": moved(seconds=6.0, most_rad=most_rad)}, Part("wheel")
+    ).library
     assert ("gravity" in {effect.name for effect in known}) is tried
 
 

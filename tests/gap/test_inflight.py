@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import permutations
 from pathlib import Path
 
@@ -50,16 +51,25 @@ def of(rig: Rig, record: Record, **values: float) -> tuple[EffectInFlight, ...]:
     effects = tuple(BY_NAME[name] for name in values)
     flat = {effect.value_key(effect.free[0]): values[effect.name] for effect in effects}
     found = Fit(effects, flat, {}, {}, (), apply(rig, "column", effects, flat), 0.0)
-    again = Again.of(rig, "column", record)
+    again = Again.of(rig, ["column"], record)
     assert again is not None
-    made = in_flight(Case(rig, "column", ()), found, "column", again)
+    made = flown_with(rig, found, again)
     assert made is not None
     return made
 
 
+def flown_with(rig: Rig, found: Fit, again: Again) -> tuple[EffectInFlight, ...] | None:
+    case, names = Case(rig, "column", ()), [(None, effect.name) for effect in found.effects]
+
+    def rig_with(kept: Sequence[int]) -> Rig:
+        return case.with_only(found, [found.effects[i] for i in kept])
+
+    return in_flight(names, rig_with, ["column"], again)
+
+
 def test_one_effect_changes_what_leaving_it_out_changes(rig: Rig, record: Record) -> None:
     (one,) = of(rig, record, elevator_effectiveness=0.7)
-    again = Again.of(rig, "column", record)
+    again = Again.of(rig, ["column"], record)
     assert again is not None
     less = rig.changed({"flight.elevator_effectiveness": 0.7})
     flights = [fly_force(each.changed({"noise": {}}), again.pulled) for each in (rig, less)]
@@ -94,8 +104,8 @@ def test_what_is_in_the_record_alone_does_nothing(rig: Rig, record: Record) -> N
 def test_a_bench_has_none(tmp_path: Path) -> None:
     bench = nominal_rig(False)
     record = made(tmp_path, bench, {}, 4)
-    again = Again.of(bench, "column", record)
+    again = Again.of(bench, ["column"], record)
     assert again is not None
     effect = BY_NAME["inertia"]
     found = Fit((effect,), {"inertia.factor": 1.3}, {}, {}, (), bench, 0.0)
-    assert in_flight(Case(bench, "column", ()), found, "column", again) is None
+    assert flown_with(bench, found, again) is None

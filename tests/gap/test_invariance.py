@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from coupled.gap.chain import Part
 from coupled.gap.diagnose import Diagnosis, diagnose
 from coupled.gap.effects.effect import Effect, Signature
 from coupled.gap.effects.entries import added
@@ -86,7 +87,7 @@ def test_a_control_by_another_name_has_the_same_answer(worn: Record) -> None:
 @pytest.mark.slow
 def test_an_irrelevant_effect_in_the_library_changes_no_answer(worn: Record) -> None:
     """Its number is one of the surface, which a bench does not have."""
-    prepared = prepare(RIG, {"r": worn})
+    prepared = prepare(RIG, {"r": worn}, Part("column"))
     numbers = (added("play_norm", "rigging.play_norm", 0.0, 0.5, 0.01),)
     irrelevant = Effect("irrelevant", "linkage", numbers, Signature("force", "bent"))
     _, without = search_sets(prepared.case, prepared.library)

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from coupled.gap.diagnose import diagnose
 from coupled.gap.effects.effect import apply
@@ -17,22 +15,7 @@ from coupled.resources import aircraft_folder
 from coupled.rig.rig import Rig
 from coupled.rig.rigfile import read_rig
 from tests.support.airframes import noisy
-
-PUSH_N = {"column": 40.0, "wheel": 25.0, "pedals": 80.0}
-LONG_s = 30.0
-
-
-def pushes(rig: Rig, **size_N: float) -> dict[ControlName, NDArray[np.float64]]:
-    """Return bell-shaped pushes of each control in turn, N; `size_N` gives those of some."""
-    t = np.arange(round(LONG_s * rig.frame_rate)) / rig.frame_rate
-    made = {}
-    for i, control in enumerate(rig.controls):
-        rng = np.random.default_rng(i)
-        sizes = rng.uniform(0.3, 1.0, 8) * np.where(np.arange(8) % 2, 1.0, -1.0)
-        at = 2.0 + 0.7 * i + 3.2 * np.arange(8)
-        bells = np.exp(-(((t[:, None] - at) / 0.35) ** 2))
-        made[control] = size_N.get(control, PUSH_N[control]) * bells @ sizes
-    return made
+from tests.support.threecontrols import pushes
 
 
 @pytest.fixture(scope="module")
@@ -73,7 +56,7 @@ def test_a_surface_of_wheel_and_pedals_is_judged(
     assert number.low is not None and number.high is not None
     assert number.low < value < number.high
     assert whole.guilty == ("surface",)
-    again = closed_loop(cessna, whole.improved, control, record)
+    again = closed_loop(cessna, whole.improved, [control], record)
     assert again is not None
     rate = "roll_rate_rad_per_s" if control == "wheel" else "yaw_rate_rad_per_s"
     [turned] = [one for one in again if one.channel == rate]

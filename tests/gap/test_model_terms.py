@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from coupled.errors import InputError
 from coupled.flight.airframe import main_file
 from coupled.flight.altered import parts_of
+from coupled.gap.chain import Part
 from coupled.gap.diagnose import diagnose
 from coupled.gap.effects.airframe import AIRFRAME, term
 from coupled.gap.effects.effect import Effect, apply, value_of
@@ -56,7 +57,7 @@ def worn(cessna: Rig, tmp_path_factory: pytest.TempPathFactory) -> Record:
 
 def searched(rig: Rig, record: Record, library: Sequence[Effect]) -> Choice:
     """Return the set of some effects that explains a record's surfaces and motion."""
-    case = prepare(rig, {"r": motion_of(record)}).case
+    case = prepare(rig, {"r": motion_of(record)}, Part("column")).case
     return search_sets(replace(case, outputs_with_noise_of=None), library)[1]
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from coupled.gap.chain import Part
 from coupled.gap.effects.library import BY_NAME
 from coupled.gap.prepare import prepare
 from coupled.gap.search.beam import search_sets
@@ -40,7 +41,7 @@ def test_the_numbers_of_an_effect_are_recovered(
 ) -> None:
     effect, nominal = BY_NAME[name], nominal_rig(flown)
     true = resized(name, values, times)
-    case = prepare(nominal, {"r": made(tmp_path, nominal, {name: true}, 7)}).case
+    case = prepare(nominal, {"r": made(tmp_path, nominal, {name: true}, 7)}, Part("column")).case
     ours = [output for output in case.outputs if output.stage in effect.shows_in]
     found = search_sets(replace(case, outputs=ours), [effect])[1].fit
     assert [one.name for one in found.effects] == [name]

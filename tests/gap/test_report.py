@@ -247,7 +247,8 @@ def check_friction(found: Diagnosis, friction_N: float, offset_N: float) -> None
     assert names in (by_direction, even)
     [rivals] = {group[1:] for group in found.rivals}
     assert set(rivals) >= (even if names == by_direction else by_direction)
-    laws = [found.choice.fit, *(one.fit for step in found.choice.steps for one in step.rivals)]
+    choice = found.parts[0].choice
+    laws = [choice.fit, *(one.fit for step in choice.steps for one in step.rivals)]
     known = {frozenset(effect.name for effect in fit.effects): fit for fit in laws}
     one, two = known[frozenset(by_direction)], known[frozenset(even)]
     for fit, friction, offset in (

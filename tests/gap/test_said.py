@@ -51,7 +51,7 @@ def test_a_key_that_is_no_effect_is_explained(
     found = SimpleNamespace(key="loader.servo_frequency_Hz", filed=None, found=9.0, unit="Hz")
     whole = SimpleNamespace(
         summary="A servo.",
-        effects=(SimpleNamespace(parameters=(found,)),),
+        effects=(SimpleNamespace(parameters=(found,), key_of=lambda p: p.key),),
         settings=(),
         nominal=old,
         improved=new,

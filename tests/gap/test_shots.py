@@ -9,6 +9,7 @@ from coupled.flight.aircraft import make_aircraft
 from coupled.flight.airframe import JSBSimAirframe
 from coupled.flight.conditions import Conditions, condition_wrappers
 from coupled.flight.weather import Wind
+from coupled.gap.chain import Part
 from coupled.gap.effects.effect import Effect, Parameter, Signature
 from coupled.gap.prepare import prepare
 from coupled.gap.search.case import Case
@@ -120,11 +121,11 @@ def test_a_record_without_a_state_says_what_is_not_judged(
     for output in outputs:
         assert output.gap(rig) == pytest.approx(before[output.channel], rel=0.02)
     said = f"Without {name} speed and attitude are not judged, which show drag and thrust."
-    assert prepare(rig, {"r": record}).left_out == (said,)
+    assert prepare(rig, {"r": record}, Part("column")).left_out == (said,)
 
 
 def test_a_complete_record_says_nothing_of_the_kind(rig: Rig, healthy: Record) -> None:
-    assert prepare(rig, {"r": healthy}).left_out == ()
+    assert prepare(rig, {"r": healthy}, Part("column")).left_out == ()
 
 
 def test_late_stamps_of_the_motion_delay_its_restarts_too(rig: Rig, healthy: Record) -> None:

@@ -218,12 +218,14 @@ def compare(
     control: ControlName,
     well: tuple[Sequence[Record], Sequence[Output]],
     now: tuple[Sequence[Record], Sequence[Output]],
+    force: bool = True,
 ) -> Comparison:
     """Return records tested against healthy ones, each with the outputs that they let judge.
 
-    `rig` is the one whose predictions are taken off, and knows nothing of either.
+    `rig` is the one whose predictions are taken off, and knows nothing of either. The `force` on
+    the control is tested too.
     """
-    healthy, tested = (_signals(rig, control, *each) for each in (well, now))
+    healthy, tested = (_signals(rig, control, *each, force) for each in (well, now))
     names = [name for name in healthy[0] if all(name in one for one in (*healthy, *tested))]
     features = {name: _features(healthy, tested, name) for name in names}
     every = [feature for each in features.values() for feature in each]
@@ -248,7 +250,11 @@ def compare(
 
 
 def _signals(
-    rig: Rig, control: ControlName, records: Sequence[Record], outputs: Sequence[Output]
+    rig: Rig,
+    control: ControlName,
+    records: Sequence[Record],
+    outputs: Sequence[Output],
+    with_force: bool,
 ) -> Signals:
     """Return each record's signals by name: the force, and the residual of each output."""
     found = []
@@ -259,7 +265,7 @@ def _signals(
         if place is not None:
             moved = _Moved(place, rate_of(place, rig.frame_rate))
             force = channel(control, "force")
-            if force in record:
+            if with_force and force in record:
                 pull = record[force]
                 rms = float(np.sqrt(np.mean(pull**2)))
                 ours[force] = _Signal("loader", force, pull, moved, rms)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from coupled.arguments import public
+from coupled.gap.chain import Part
+from coupled.gap.effects.effect import Effect, keys_of
+from coupled.gap.effects.library import EFFECTS
 from coupled.gap.findings.changed import Comparison
 from coupled.gap.findings.flown import Again, ChannelAgain, closed_loop, nearer
 from coupled.gap.findings.healthy import Baseline
@@ -15,7 +18,7 @@ from coupled.gap.findings.inflight import EffectInFlight, in_flight, in_words
 from coupled.gap.findings.inseparable import Alike
 from coupled.gap.findings.power import EffectPower, power
 from coupled.gap.findings.proposal import ProposedTest, in_one_line, next_tests
-from coupled.gap.findings.result import FORMAT, Findings
+from coupled.gap.findings.result import FORMAT, EffectResult, Findings
 from coupled.gap.findings.shrink import Shrink
 from coupled.gap.findings.summary import MISFIT, NOISE, filtered_words, summary
 from coupled.gap.search.case import Case
@@ -30,26 +33,25 @@ from coupled.rig.rig import Rig
 if TYPE_CHECKING:
     import polars as pl
 
-COLUMNS = ("effect", "stage", "probability", "key", "unit", "filed", "found", "low", "high")
+COLUMNS = (
+    *("control", "effect", "stage", "probability"),
+    *("key", "unit", "filed", "found", "low", "high"),
+)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Diagnosis(Findings, TableResult):
     """The findings of a diagnosis, and the rig with the effects found (`improved`).
 
-    `closed_loop`, `in_flight`, `next_tests` and `power` are computed on first use: each simulates
-    the rig and takes as long as the diagnosis or longer.
+    `parts` are the diagnoses that it consists of: one, or that of each judged control and of the
+    airframe. `closed_loop`, `in_flight`, `next_tests` and `power` are computed on first use: each
+    simulates the rig and takes as long as the diagnosis or longer.
     """
 
-    control: ControlName
     shrink: Shrink
     nominal: Rig = field(repr=False, compare=False)
     improved: Rig = field(repr=False, compare=False)
     records: Mapping[str, Record] = field(repr=False, compare=False)
-    outputs: tuple[Output, ...] = field(repr=False, compare=False)
-    choice: Choice = field(repr=False, compare=False)
-    baseline: Baseline | None = field(default=None, repr=False, compare=False)
-    change: Comparison | None = field(default=None, repr=False, compare=False)
     # Channels whose logs were filtered, and the source of their noise floors.
     filtered: Mapping[str, str] = field(default_factory=dict)
     # What of the records is not judged, or judged with changes; a sentence each.
@@ -62,23 +64,20 @@ class Diagnosis(Findings, TableResult):
     def __repr__(self) -> str:
         found = "; ".join(
             ", ".join(
-                [e.name, *(f"{p.key} = {p.found:.4g} {p.unit}".strip() for p in e.parameters)]
+                [e.label.replace(" ", "_")]
+                + [f"{p.key} = {p.found:.4g} {p.unit}".strip() for p in e.parameters]
             )
             for e in self.effects
         )
         words = f"{self.verdict}; {found}" if found else self.verdict
         return f"Diagnosis({self.nominal.name}, {self.subject}: {words})"
 
-    @property
-    def subject(self) -> str:
-        """The control, or the airframe of a rig without controls."""
-        return self.control if self.nominal.controls else "airframe"
-
     def to_polars(self) -> pl.DataFrame:
         """Return a row a parameter of the effects found; the units are in the column `unit`."""
         rows = []
         for effect in self.effects:
-            head = {"effect": effect.name, "stage": effect.stage, "probability": effect.probability}
+            head: dict[str, Any] = {"control": self.control_of(effect), "effect": effect.name}
+            head |= {"stage": effect.stage, "probability": effect.probability}
             rows += [
                 head
                 | {"key": p.key, "unit": p.unit, "filed": p.filed, "found": p.found}
@@ -88,6 +87,20 @@ class Diagnosis(Findings, TableResult):
         return frame_of(rows, COLUMNS)
 
     @property
+    def parts(self) -> tuple[PartDiagnosis, ...]:
+        """The diagnoses of the parts, in the order of the rig's controls."""
+        raise NotImplementedError
+
+    @property
+    def controls(self) -> tuple[ControlName, ...]:
+        """The judged controls, in the order of the rig."""
+        return tuple(one.part.control for one in self.parts if one.part.own)
+
+    def control_of(self, effect: EffectResult) -> str | None:
+        """Return the control of an effect; None for one of the airframe."""
+        return effect.control
+
+    @property
     def first(self) -> Record:
         """The first record, with which flights and next tests are computed."""
         return next(iter(self.records.values()))
@@ -95,62 +108,75 @@ class Diagnosis(Findings, TableResult):
     @cached_property
     def closed_loop(self) -> tuple[ChannelAgain, ...] | None:
         """RMS differences from the record of both rigs flown with its force; None if no effect."""
-        if not self.choice.steps:
+        if not self.effects:
             return None
-        return closed_loop(self.nominal, self.improved, self.control, self.first, self._again)
+        given = (self.nominal, self.improved, self.controls)
+        return closed_loop(*given, self.first, self._again)
 
     @cached_property
     def _again(self) -> Again | None:
         """The simulation with the first record's force."""
-        return Again.of(self.nominal, self.control, self.first)
+        return Again.of(self.nominal, self.controls, self.first)
 
     @cached_property
     def in_flight(self) -> tuple[EffectInFlight, ...] | None:
         """The change of the flight by each effect, largest first; None without flight or effect."""
-        if not self.choice.steps or self._again is None:
+        if not self.effects or self._again is None:
             return None
-        case = Case(self.nominal, self.control, self.outputs)
-        return in_flight(case, self.choice.fit, self.control, self._again)
+        every = [(part, effect) for part in self.parts for effect in part.choice.fit.effects]
+
+        def rig_with(kept: Sequence[int]) -> Rig:
+            some = [every[i] for i in kept]
+            return self.joined(
+                [part.rig_with([e for of, e in some if of is part]) for part in self.parts]
+            )
+
+        names = [(self.owner(part, effect.stage), effect.name) for part, effect in every]
+        return in_flight(names, rig_with, self.controls, self._again)
+
+    def owner(self, part: PartDiagnosis, stage: str) -> ControlName | None:
+        """Return the control by which results of a part's stage are labelled; None for none."""
+        return part.part.owner(stage) if len(self.parts) > 1 else None
+
+    def joined(self, rigs: Sequence[Rig]) -> Rig:
+        """Return the rig that has the controls and the aircraft of the parts' rigs."""
+        (rig,) = rigs
+        return rig
 
     @property
     def improves(self) -> bool:
         """Whether the improved rig's flight is no further from the record than the filed rig's."""
         return self.closed_loop is None or nearer(self.closed_loop)
 
-    @cached_property
+    @property
     def next_tests(self) -> tuple[ProposedTest, ...]:
         """The tests that would discriminate the first alternatives, best first; empty if none."""
-        return next_tests(self.nominal, self.first, self.control, self.choice)
+        raise NotImplementedError
 
     @property
     def next_test(self) -> str:
         """What to record next, in a sentence; empty if no record would help."""
-        lacking = [
-            worth_recording(self.nominal, self.control, stage.name, stage.missing)
-            for stage in (self.stages if self.nominal.controls else ())
-        ]
-        wanted = [stage.hidden.wanted for stage in self.stages if stage.hidden is not None]
-        return in_one_line(self.next_tests, sorted(set().union(*lacking)), wanted)
+        raise NotImplementedError
 
-    @cached_property
+    @property
     def power(self) -> tuple[EffectPower, ...]:
         """The smallest size of each effect that would have been detected."""
-        return power(self.choice.without_effects.rig, self.control, self.outputs)
+        raise NotImplementedError
 
-    @cached_property
+    @property
     def summary(self) -> str:
         """The faults, their sizes, probabilities and shares of the gap, and what to record next."""
-        flight = "" if self.in_flight is None else in_words(self.in_flight)
-        filtered = filtered_words(self.filtered)
-        missed = self.baseline is not None and self.baseline.missed
-        floor = MISFIT if missed else NOISE
-        said = summary(self, self.shrink, flight, filtered, self.next_test, floor)
-        said += "".join(f" Not distinguished: {one.words}." for one in self.inseparable)
-        held = "" if self.baseline is None else self.baseline.words
-        changed = "" if self.change is None else self.change.words
-        return " ".join(
-            words for words in (self.trim, held, changed, said, *self.left_out) if words
-        )
+        raise NotImplementedError
+
+    @property
+    def beside_healthy(self) -> dict[str, Any]:
+        """The JSON of the comparison with the healthy machine; empty without one."""
+        raise NotImplementedError
+
+    def owned(self, one: EffectResult | EffectInFlight | EffectPower) -> dict[str, Any]:
+        """Return the JSON of a result of an effect; with its control, where several are judged."""
+        found = one.as_dict()
+        return found | {"control": one.control} if len(self.parts) > 1 else found
 
     @public
     def as_dict(self, with_power: bool = False) -> dict[str, Any]:
@@ -158,8 +184,9 @@ class Diagnosis(Findings, TableResult):
         found: dict[str, Any] = {
             "format": FORMAT,
             "verdict": self.verdict,
+            "controls": list(self.controls),
             "stages": {stage.name: stage.as_dict() for stage in self.stages},
-            "effects": [effect.as_dict() for effect in self.effects],
+            "effects": [self.owned(effect) for effect in self.effects],
             "rivals": [list(group) for group in self.rivals],
             "budget": {one.stage: one.as_dict() for one in self.budget},
             "budget_95": {one.stage: one.intervals() for one in self.budget},
@@ -175,16 +202,98 @@ class Diagnosis(Findings, TableResult):
             found["left_out"] = list(self.left_out)
         if self.trim:
             found["trim"] = self.trim
-        if self.baseline is not None:
-            compared = {} if self.change is None else self.change.as_dict()
-            found["healthy"] = self.baseline.as_dict() | compared
+        if self.beside_healthy:
+            found["healthy"] = self.beside_healthy
         if self.closed_loop is not None:
             found["closed_loop"] = {again.channel: again.as_dict() for again in self.closed_loop}
         if self.in_flight is not None:
-            found["in_flight"] = [one.as_dict() for one in self.in_flight]
+            found["in_flight"] = [self.owned(one) for one in self.in_flight]
         if self.next_tests:
             found["next_tests"] = [test.as_dict() for test in self.next_tests]
         found["next_test"] = self.next_test
         if with_power:
-            found["power"] = [one.as_dict() for one in self.power]
+            found["power"] = [self.owned(one) for one in self.power]
         return found
+
+
+@dataclass(frozen=True, kw_only=True)
+class PartDiagnosis(Diagnosis):
+    """The diagnosis of one control, or of the airframe alone (`part`)."""
+
+    part: Part
+    outputs: tuple[Output, ...] = field(repr=False, compare=False)
+    choice: Choice = field(repr=False, compare=False)
+    baseline: Baseline | None = field(default=None, repr=False, compare=False)
+    change: Comparison | None = field(default=None, repr=False, compare=False)
+
+    __repr__ = Diagnosis.__repr__
+
+    @property
+    def parts(self) -> tuple[PartDiagnosis, ...]:
+        """The diagnosis itself."""
+        return (self,)
+
+    def control_of(self, effect: EffectResult) -> str | None:
+        """Return the control of an effect; None for one of the airframe."""
+        return self.part.owner(effect.stage)
+
+    @property
+    def gains(self) -> list[float]:
+        """The log evidence lost without each of the effects, in their order."""
+        return sorted((step.gain for step in self.choice.steps), reverse=True)
+
+    def rig_with(self, effects: Sequence[Effect]) -> Rig:
+        """Return the rig with some of the effects found, and the fitted nuisance parameters."""
+        return self._case.with_only(self.choice.fit, effects)
+
+    @cached_property
+    def _case(self) -> Case:
+        return Case(self.nominal, self.part.control, self.outputs)
+
+    @cached_property
+    def next_tests(self) -> tuple[ProposedTest, ...]:
+        """The tests that would discriminate the first alternatives, best first; empty if none."""
+        return next_tests(self.nominal, self.first, self.part.control, self.choice)
+
+    @property
+    def next_test(self) -> str:
+        """What to record next, in a sentence; empty if no record would help."""
+        lacking = [
+            worth_recording(self.nominal, self.part.control, stage.name, stage.missing)
+            for stage in self.stages
+        ]
+        wanted = [stage.hidden.wanted for stage in self.stages if stage.hidden is not None]
+        return in_one_line(self.next_tests, sorted(set().union(*lacking)), wanted)
+
+    @cached_property
+    def power(self) -> tuple[EffectPower, ...]:
+        """The smallest size of each effect that would have been detected."""
+        library = [effect for effect in EFFECTS if self.part.frees(keys_of([effect]))]
+        root = self.choice.without_effects.rig
+        return power(root, self.part.control, self.outputs, library)
+
+    @cached_property
+    def summary(self) -> str:
+        """The faults, their sizes, probabilities and shares of the gap, and what to record next."""
+        flight = "" if self.in_flight is None else in_words(self.in_flight)
+        said = (self.trim, self.words(flight, self.next_test), *self.left_out)
+        return " ".join(words for words in said if words)
+
+    def words(self, flight: str = "", next_test: str = "") -> str:
+        """Return the summary's sentences on the part, with those on the flight and a next test."""
+        filtered = filtered_words(self.filtered)
+        missed = self.baseline is not None and self.baseline.missed
+        floor = MISFIT if missed else NOISE
+        said = summary(self, self.shrink, flight, filtered, next_test, floor)
+        said += "".join(f" Not distinguished: {one.words}." for one in self.inseparable)
+        held = "" if self.baseline is None else self.baseline.words
+        changed = "" if self.change is None else self.change.words
+        return " ".join(words for words in (held, changed, said) if words)
+
+    @property
+    def beside_healthy(self) -> dict[str, Any]:
+        """The JSON of the comparison with the healthy machine; empty without one."""
+        if self.baseline is None:
+            return {}
+        compared = {} if self.change is None else self.change.as_dict()
+        return self.baseline.as_dict() | compared

@@ -29,6 +29,7 @@ class KeptEffect(Lenient):
 
     name: str
     probability: float = quantity("", ge=0, le=1)
+    control: str | None = None
     parameters: dict[str, KeptParameter] = {}
 
 

@@ -111,12 +111,12 @@ class Again:
     _flown: list[tuple[Rig, Record | None]] = field(default_factory=list, repr=False)
 
     @classmethod
-    def of(cls, nominal: Rig, control: ControlName, record: Record) -> Again | None:
-        """Return the simulation; None if the record lacks the control's force, or a bench's q̄."""
+    def of(cls, nominal: Rig, controls: Sequence[ControlName], record: Record) -> Again | None:
+        """Return the simulation; None if the record lacks a control's force, or a bench's q̄."""
         pressure = "dynamic_pressure_Pa"
         forces = {name: channel(name, "force") for name in nominal.controls}
         pulled = {n: smoothed(record[force]) for n, force in forces.items() if force in record}
-        if control not in pulled or (nominal.flight is None and pressure not in record):
+        if not pulled.keys() >= {*controls} or (nominal.flight is None and pressure not in record):
             return None
         return cls(record, pulled, smoothed(record[pressure]) if pressure in record else None)
 
@@ -138,21 +138,24 @@ class Again:
 
 
 def closed_loop(
-    nominal: Rig, improved: Rig, control: ControlName, record: Record, again: Again | None = None
+    nominal: Rig,
+    improved: Rig,
+    controls: Sequence[ControlName],
+    record: Record,
+    again: Again | None = None,
 ) -> tuple[ChannelAgain, ...] | None:
-    """Return the RMS differences from the record of both rigs, flown with its force.
+    """Return the RMS differences from the record of both rigs, flown with the controls' forces.
 
-    `again` is the simulation, if it exists already. None if the record lacks the force or a
+    `again` is the simulation, if it exists already. None if the record lacks a force or a
     bench's q̄, or if a rig cannot be flown.
     """
-    if not nominal.controls or nominal.controls[control].drive != "force":
+    if not nominal.controls or any(nominal.controls[c].drive != "force" for c in controls):
         return None
-    again = Again.of(nominal, control, record) if again is None else again
+    again = Again.of(nominal, controls, record) if again is None else again
     if again is None:
         return None
-    names = [channel(control, quantity) for quantity in COMPARED]
-    surface = surface_channel(control)
-    motion = [surface, *MOTION, *LATERAL]
+    names = [channel(control, quantity) for control in controls for quantity in COMPARED]
+    motion = [*map(surface_channel, controls), *MOTION, *LATERAL]
     motion = motion if nominal.flight is not None else []
     names = [name for name in (*names, *motion) if name in record]
     before, after = (_differences(again, rig, names) for rig in (nominal, improved))

@@ -186,10 +186,15 @@ class Baseline:
         given = (records, case.outputs, case.control, case.nominal)
         return cls(*given, rig, found.effects, errors, stages)
 
-    def compared(self, records: Sequence[Record], outputs: Sequence[Output]) -> Comparison:
-        """Return records, with their outputs, tested against the healthy ones."""
+    def compared(
+        self, records: Sequence[Record], outputs: Sequence[Output], force: bool = True
+    ) -> Comparison:
+        """Return records, with their outputs, tested against the healthy ones.
+
+        The `force` on the control is tested too.
+        """
         well = (list(self.records.values()), self.outputs)
-        return compare(self.nominal, self.control, well, (records, outputs))
+        return compare(self.nominal, self.control, well, (records, outputs), force)
 
     def raised(self, outputs: Sequence[Output]) -> list[Output]:
         """Return outputs with the model error in their noise floors, where it is known."""

@@ -120,11 +120,14 @@ class Judge:
         """Return sensing: faulty if its effect was found, else not judged.
 
         A wrong sensor scale has no residual of its own, but shows in several other stages. The
-        largest of their gaps is its gap.
+        largest of their gaps is its gap. An effect of the sensors of the motion shows elsewhere.
         """
         shown = dict.fromkeys(stage_of(o) for o in STAGE_OF["sensing"].effects_show_in)
         neighbours = tuple(name for name in shown if name in before)
         if "sensing" in self.blamed:
+            found = [s.effect for s in self.choice.steps if s.effect.stage == "sensing"]
+            others = {stage_of(output) for effect in found for output in effect.shows_in}
+            neighbours = neighbours or tuple(name for name in before if name in others)
             widest = max(before[name] for name in neighbours)
             return StageResult("sensing", widest, guilty=True, shown_in=neighbours)
         why = f"see {', '.join(neighbours or shown)}"

@@ -48,6 +48,7 @@ class EffectPower:
     judged: bool = True
     shows: bool = False
     parameters: tuple[tuple[str, float], ...] = ()
+    control: str | None = None  # where several are judged; None for the airframe
 
     def as_dict(self) -> dict[str, Any]:
         """Return the JSON."""

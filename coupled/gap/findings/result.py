@@ -12,6 +12,7 @@ from typing import Any, Literal
 
 from coupled.arguments import public
 from coupled.gap.effects.airframe import TERM
+from coupled.gap.effects.effect import dotted
 from coupled.gap.findings.budget import StageBudget
 from coupled.gap.findings.credibility import Credibility, remainder
 from coupled.gap.findings.where import Remains, Where
@@ -21,8 +22,19 @@ from coupled.gap.thresholds import FAULTY_FROM
 
 # Of the JSON. A file without a format is read as one from before formats were numbered; a newer
 # format is refused (`files.check_format`).
-FORMAT = 2
+FORMAT = 3
 Verdict = Literal["no_gap", "effect", "mostly", "ambiguous", "unexplained"]
+
+
+def labelled(name: str, control: str | None) -> str:
+    """Return an effect's name for people; with its control, if given."""
+    words = name.replace("_", " ")
+    return f"{control} {words}" if control else words
+
+
+def placed(stage: str, control: str | None) -> str:
+    """Return a stage's name among those of several controls; of one control, the stage's own."""
+    return f"{control}.{stage}" if control else stage
 
 
 @dataclass(frozen=True)
@@ -156,11 +168,26 @@ class EffectResult:
     credibility: Credibility | None = None
     course: Course | None = None
     of: str = ""
+    control: str | None = None  # where several are judged; None for the airframe
+
+    @property
+    def label(self) -> str:
+        """Its name for people, with its control where several are judged."""
+        return labelled(self.name, self.control)
+
+    @property
+    def place(self) -> str:
+        """Its stage, with its control where several are judged: `linkage` or `column.linkage`."""
+        return placed(self.stage, self.control)
 
     @property
     def value(self) -> float | None:
         """The value of its first parameter; None if it has none (a discrete effect)."""
         return self.parameters[0].value if self.parameters else None
+
+    def key_of(self, parameter: ParameterEstimate) -> str:
+        """Return a parameter's key in the rig file; with its control where several are judged."""
+        return dotted(parameter.key, self.control) if self.control else parameter.key
 
     def as_dict(self) -> dict[str, Any]:
         """Return the JSON."""
@@ -208,8 +235,8 @@ class SettingResult:
 class Findings:
     """The results of a diagnosis: verdict, stages, effects and budget.
 
-    `stages` are in the order of the chain, `effects` with the largest first; `rivals` are groups
-    of effects that the records do not distinguish.
+    `control` may be `airframe`. `stages` are in the order of the chain, `effects` with the largest
+    first; `rivals` are groups of effects that the records do not distinguish.
     """
 
     control: str

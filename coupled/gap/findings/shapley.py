@@ -15,6 +15,30 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 
+MOST_PLAYERS = 5  # chosen: 32 subsets; more are averaged over first and last
+
+
+def shapley_subsets(players: int) -> tuple[list[int], Floats]:
+    """Return the subsets whose powers are needed, and their weights, (players, subsets).
+
+    Subset 0 is the first and that of all players the last. For more than `MOST_PLAYERS` players,
+    the reductions of each as the first and as the last player are averaged. That is exact if the
+    power is the mean square of a sum of the players' actions.
+    """
+    if players <= MOST_PLAYERS:
+        return list(range(2**players)), shapley_weights(players)
+    whole = 2**players - 1
+    subsets = [
+        0,
+        *(1 << i for i in range(players)),
+        *(whole - (1 << i) for i in range(players)),
+        whole,
+    ]
+    one = np.eye(players)
+    none = np.ones((players, 1))
+    return subsets, 0.5 * np.hstack([none, -one, one, -none])
+
+
 def shapley_weights(players: int) -> Floats:
     """Return the weight of each subset's power in each player's share, (players, 2^players).
 

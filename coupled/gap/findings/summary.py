@@ -114,8 +114,7 @@ def _not_judged(found: Findings) -> str:
 
 def _what(found: Findings, floor: str) -> str:
     if found.verdict == "no_gap":
-        within = "stays within its noise" if floor == NOISE else f"leaves {floor}"
-        return f"No gap in the {found.subject}: every stage that could be judged {within}."
+        return no_gap_in([found.subject], floor)
     hidden = [stage for stage in found.stages if stage.hidden is not None]
     if hidden and not found.guilty:
         why = "; ".join(f"the {stage.name} is not judged, as {stage.why}" for stage in hidden)
@@ -134,6 +133,12 @@ def _what(found: Findings, floor: str) -> str:
         _explained(acting[stage.name], stage, budgets.get(stage.name), floor)
         for stage in sorted(stages, key=lambda one: not acting[one.name])
     )
+
+
+def no_gap_in(controls: Sequence[str], floor: str = NOISE) -> str:
+    """Return the sentence on controls without a gap; one of them may be the airframe."""
+    within = "stays within its noise" if floor == NOISE else f"leaves {floor}"
+    return f"No gap in the {joined(controls)}: every stage that could be judged {within}."
 
 
 def _acting(found: Findings, stage: StageResult, budget: StageBudget | None) -> list[EffectResult]:
@@ -157,7 +162,7 @@ def _explained(
         f"{_effect(e)}{',' if e.parameters else ''} explains {_per_cent(budget.of(e.name))}"
         for e in acting
     ]
-    said = f"{_capital(' and '.join(shares))} of the {stage.name}'s gap"
+    said = f"{capital(' and '.join(shares))} of the {stage.name}'s gap"
     over = stage.left is not None and stage.limit is not None and stage.left > stage.limit
     if over and not stage.unexplained:
         left = f"{_per_cent(budget.remains)} remains, {stage.left:.3g} floors"
@@ -176,7 +181,8 @@ def _per_cent(share: float) -> str:
     return f"{100 * share:.1f} %" if nearly else f"{100 * share:.0f} %"
 
 
-def _capital(text: str) -> str:
+def capital(text: str) -> str:
+    """Return a text with its first letter as a capital."""
     return text[:1].upper() + text[1:]
 
 
@@ -209,13 +215,13 @@ def _settings(found: Findings) -> str:
         off = [one.words for one in found.settings if one.stage == stage.name and one.moved]
         if off:
             said.append(
-                f"The {stage.name} is at {stage.gap:.3g} floors because of {_joined(off)},"
+                f"The {stage.name} is at {stage.gap:.3g} floors because of {joined(off)},"
                 " each within its tolerance, and is not faulty."
             )
     return " ".join(said)
 
 
-def _joined(words: Sequence[str]) -> str:
+def joined(words: Sequence[str]) -> str:
     """Return words as a list in prose: a, b and c."""
     *first, last = words
     return f"{', '.join(first)} and {last}" if first else last
@@ -267,10 +273,10 @@ def in_time(effect: EffectResult) -> str:
         if course.kind != "events" and (first.relative or first.name == "per_s"):
             share, unit = share.times(100.0), " %"
             if abs(share.value) > MOST_CHANGE:
-                return f"{_capital(plain(effect.name))}: {', '.join([*said, FAST])}."
+                return f"{capital(plain(effect.name))}: {', '.join([*said, FAST])}."
         ends = f"{share.low:.3g} to {share.high:.3g}"
         said.append(f"at {share.value:.3g}{unit} a minute ({ends})")
-    return f"{_capital(plain(effect.name))}: {', '.join(said)}." if said else ""
+    return f"{capital(plain(effect.name))}: {', '.join(said)}." if said else ""
 
 
 def _line(channel: str, line: SeenLine) -> str:
