@@ -97,7 +97,8 @@ def test_the_lateral_motion_is_compared_if_aileron_and_rudder_are_recorded(healt
 
     assert {"roll_rate_rad_per_s", "sideslip_rad"} < compared(healthy)
     assert compared(without(healthy, "rudder_rad")) == {
-        *("pitch_rate_rad_per_s", "alpha_rad", "load_factor", "elevator_trim_rad")
+        *("pitch_rate_rad_per_s", "alpha_rad", "load_factor", "elevator_trim_rad"),
+        *("true_airspeed_m_per_s", "pitch_rad"),
     }
 
 

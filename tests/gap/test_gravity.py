@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import pytest
+from coupled.plots.signature import draw_signature
 
 from coupled.errors import InputError
 from coupled.gap.chain import Part
 from coupled.gap.diagnose import diagnose
 from coupled.gap.prepare import prepare
+from coupled.plots.gapview import View
 from tests.support.pendulum import WEIGHT_N, ANGLE_rad, moved, moved_rig
 
 
@@ -45,6 +47,8 @@ def test_a_record_of_three_seconds_is_judged_where_it_swings() -> None:
     found = diagnose(moved_rig(), {"r": moved(seconds=3.0, pace=2.0)}, "wheel")
     assert found.effects[0].name == "gravity"
     assert found.effects[0].value == pytest.approx(WEIGHT_N, rel=0.05)  # a mass known to 2 %
+    (part,) = found.parts
+    assert "gravity" in draw_signature(View(part)).subfigs[0].get_suptitle()
 
 
 def test_a_short_record_without_swings_is_refused() -> None:

@@ -260,7 +260,7 @@ class PartDiagnosis(Diagnosis):
         """What to record next, in a sentence; empty if no record would help."""
         lacking = [
             worth_recording(self.nominal, self.part.control, stage.name, stage.missing)
-            for stage in self.stages
+            for stage in (self.stages if self.nominal.controls else ())
         ]
         wanted = [stage.hidden.wanted for stage in self.stages if stage.hidden is not None]
         return in_one_line(self.next_tests, sorted(set().union(*lacking)), wanted)

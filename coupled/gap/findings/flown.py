@@ -116,7 +116,8 @@ class Again:
         pressure = "dynamic_pressure_Pa"
         forces = {name: channel(name, "force") for name in nominal.controls}
         pulled = {n: smoothed(record[force]) for n, force in forces.items() if force in record}
-        if not pulled.keys() >= {*controls} or (nominal.flight is None and pressure not in record):
+        lacks_pressure = nominal.flight is None and pressure not in record
+        if not pulled or not pulled.keys() >= {*controls} or lacks_pressure:
             return None
         return cls(record, pulled, smoothed(record[pressure]) if pressure in record else None)
 
