@@ -17,6 +17,7 @@ from dataclasses import replace
 
 from coupled.gap.findings.answer import effects_of, incredible, settings_of, verdict_of
 from coupled.gap.findings.budget import stage_budget
+from coupled.gap.findings.curves import find_curves
 from coupled.gap.findings.diagnosis import Diagnosis
 from coupled.gap.findings.healthy import Baseline, beside_healthy
 from coupled.gap.findings.inseparable import inseparable
@@ -82,6 +83,9 @@ def findings(prepared: Prepared, case: Case, choice: Choice) -> Diagnosis:
     baseline, records = prepared.baseline, list(prepared.records.values())
     change = None if baseline is None else baseline.compared(records, prepared.case.outputs)
     verdict = verdict_of(choice, stages, effects, budget)
+    curves = None
+    if verdict in ("mostly", "unexplained"):
+        curves = find_curves(case, choice, effects, [reader.record for reader in readers])
     verdict, stages = beside_healthy(verdict, stages, baseline, change)
     return Diagnosis(
         control=control,
@@ -107,4 +111,5 @@ def findings(prepared: Prepared, case: Case, choice: Choice) -> Diagnosis:
         filtered={name: one for reader in readers for name, one in reader.filtered().items()},
         left_out=prepared.left_out,
         inseparable=inseparable(choice.fit),
+        curved=curves,
     )

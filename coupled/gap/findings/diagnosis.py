@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from coupled.arguments import public
 from coupled.gap.findings.changed import Comparison
+from coupled.gap.findings.curves import Curve, Curves
 from coupled.gap.findings.flown import Again, ChannelAgain, closed_loop, nearer
 from coupled.gap.findings.healthy import Baseline
 from coupled.gap.findings.inflight import EffectInFlight, in_flight, in_words
@@ -56,6 +57,8 @@ class Diagnosis(Findings, TableResult):
     left_out: tuple[str, ...] = ()
     # Parameters of the effects found that the records determine only together.
     inseparable: tuple[Alike, ...] = ()
+    # The curves beside the effects that are credible; None if there are none.
+    curved: Curves | None = field(default=None, repr=False, compare=False)
     # What of the trim comes from the records or their manifests, in words; empty if nothing.
     trim: str = ""
 
@@ -81,6 +84,11 @@ class Diagnosis(Findings, TableResult):
                 for p in effect.parameters
             ]
         return frame_of(rows, COLUMNS)
+
+    @property
+    def curves(self) -> tuple[Curve, ...]:
+        """Functions of one signal that describe what no effect explains; no causes."""
+        return () if self.curved is None else self.curved.found
 
     @property
     def first(self) -> Record:
