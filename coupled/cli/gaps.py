@@ -57,9 +57,18 @@ def diagnose(
     improve: Annotated[
         Path | None, typer.Option(metavar="NEW.toml", help="Write the rig with the effects found.")
     ] = None,
+    with_curves: Annotated[
+        bool,
+        typer.Option(
+            "--with-curves",
+            help="With --improve: write the curves, too, that describe what no effect explains.",
+        ),
+    ] = False,
     plots: Annotated[
         Path | None,
-        typer.Option(metavar="DIR", help="Draw the figures ladder, stages and signature there."),
+        typer.Option(
+            metavar="DIR", help="Draw the figures ladder, stages, signature and curves there."
+        ),
     ] = None,
     power: Annotated[
         bool, typer.Option("--power", help="Say what size of each effect would have shown.")
@@ -89,12 +98,15 @@ def diagnose(
     name = control_named(control, records[0])
     if any(record.is_dir() for record in records):
         asked = {"--improve": improve, "--plots": plots, "--power": power, "--healthy": healthy}
+        asked |= {"--with-curves": with_curves}
         _refuse_for_folders(records, asked | {"--json": json_file, "--report": report})
         _diagnose_folder(records, rig, output, name, check_cluster(workers, cluster))
         return
     if workers is not None or cluster:
         option = "--cluster" if cluster else "--workers"
         raise InputError(records[0], option, "is for a folder of records")
+    if with_curves and improve is None:
+        raise InputError(records[0], "--with-curves", "is for --improve NEW.toml")
     if output is not None:
         raise InputError(output, "--output", "is for a folder of records; give --json FILE")
     rig_file = find(rig, shipped_rigs(), "rig") if rig else None
@@ -109,11 +121,13 @@ def diagnose(
     check_json(json_file, [*inputs, *targets])
     whole, read = _diagnose(records, rig_file, name, healthy or [])
     note = say_guesses(whole.nominal, (name,))
-    worse = improve is not None and not whole.improves
+    improves = whole.improves_with_curves if with_curves else whole.improves
+    worse = improve is not None and not improves
+    drawn = [target for target in drawn if target.name != CURVES or whole.curves]
     table = whole.as_dict(power) if json_file else {}
     with progress("drawing and writing"), Outputs() as outputs:
         if improve is not None and not worse:
-            _write_improved(outputs.at(improve), whole, rig_file, read)
+            _write_improved(outputs.at(improve), whole, rig_file, read, with_curves)
         if plots is not None:
             _draw(outputs.folder(plots), whole, note, units)
         keep_json(table, json_file, outputs)
@@ -186,6 +200,7 @@ def in_words(whole: Diagnosis, system: System) -> str:
     return "\n".join(f"- {sentence}" for sentence in sentences(text))
 
 
+CURVES = "curves.png"  # drawn only if there are any
 # Reasons of keys in an improved rig that are no effect's parameters.
 _GOES_WITH = "which goes with what was found; it has no effect of its own"
 _BESIDE = {
@@ -196,7 +211,11 @@ _BESIDE = {
 
 
 def _write_improved(
-    path: Path, whole: Diagnosis, rig_file: Path | None, records: dict[str, Record]
+    path: Path,
+    whole: Diagnosis,
+    rig_file: Path | None,
+    records: dict[str, Record],
+    with_curves: bool,
 ) -> None:
     from coupled.calibration.assumed import outdated_bends
     from coupled.files import read_text
@@ -214,13 +233,16 @@ def _write_improved(
         filed, held = read_rig(rig_file), shown(rig_file.name)
         text = read_text(rig_file, "a rig file is wanted")
     remark = f"{held} with what was found in {names}:\n{whole.summary}\n"
-    for effect in whole.effects:
+    improved = whole.with_curves if with_curves else whole.improved
+    curves = whole.curves if with_curves else ()
+    remark += "".join(f"added: {one.key}, {one.lists} over {one.of}; no cause\n" for one in curves)
+    for effect in whole.credible if curves else whole.effects:
         remark += "".join(f"changed: {p.key} {change(p)}\n" for p in effect.parameters)
     for setting in (one for one in whole.settings if one.moved):
         remark += f"changed: {setting.words}, within its tolerance\n"
-    remark += "".join(f"{sentence}\n" for sentence in outdated_bends(filed, whole.improved))
+    remark += "".join(f"{sentence}\n" for sentence in outdated_bends(filed, improved))
     # The trim was taken from the record, and is no change of the rig file.
-    changes = differences(trimmed(filed, records)[0], whole.improved)
+    changes = differences(trimmed(filed, records)[0], improved)
     said = remark
     for key in changes:
         dotted = ".".join(key)
@@ -233,9 +255,9 @@ def _plot_targets(folder: Path | None) -> list[Path]:
     """Return the files that a diagnosis draws into a folder."""
     if folder is None:
         return []
-    from coupled.plots.gaps import FIGURES
+    from coupled.plots.gaps import CURVES, FIGURES
 
-    return [folder / name for name in FIGURES]
+    return [folder / name for name in (*FIGURES, *CURVES)]
 
 
 def _report(

@@ -30,12 +30,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from coupled.display import split_unit
 from coupled.errors import InputError
 from coupled.gap.chain import BY_NAME as STAGE_OF
 from coupled.gap.chain import stage_of
 from coupled.gap.findings.regimes import Acts, regimes
 from coupled.gap.findings.result import EffectResult
-from coupled.gap.findings.shrink import channel_shrink
+from coupled.gap.findings.shrink import ChannelShrink, channel_shrink
 from coupled.gap.findings.where import signals
 from coupled.gap.search.case import Case
 from coupled.gap.search.evidence import Evidence, evidence, fewest_unexplained, misfit
@@ -69,7 +70,7 @@ from coupled.gap.thresholds import (
 from coupled.parallel import in_threads
 from coupled.record.channels import ControlName, unit_of
 from coupled.record.record import Record
-from coupled.rig.curves import BendCurve
+from coupled.rig.curves import BendCurve, GradientCurve
 from coupled.rig.curves import Curve as RigCurve
 from coupled.rig.rig import Rig
 from coupled.rig.surface import share_of_travel
@@ -122,9 +123,10 @@ LAWS = (
 class Curve:
     """A function of one signal that takes a residual, and is no cause.
 
-    `key` is that of the rig file, `of` the signal and `unit` the unit of the values, `low` and
-    `high` their 95 % intervals. `closed` is the share of the gap closed on held-out stretches, with
-    its interval. `like` is a closed form that fits as well, or empty.
+    `key` is that of the rig file, `of` and `lists` its keys of the nodes and of the values. `unit`
+    is that of the values, `low` and `high` their 95 % intervals. `closed` is the share of the gap
+    closed on held-out stretches, with its interval. `like` is a closed form that fits as well, or
+    empty.
     """
 
     key: str
@@ -139,6 +141,20 @@ class Curve:
     closed_low: float
     closed_high: float
     like: str = ""
+    lists: str = ""
+
+    @property
+    def words(self) -> str:
+        """The share of the gap that the curve closes, and the closed form, in words."""
+        ends = f"{100 * self.closed_low:.0f} to {100 * self.closed_high:.0f} %"
+        like = f", like {self.like}" if self.like else ""
+        return f"closes {100 * self.closed:.0f} % of the gap on held-out data ({ends}){like}"
+
+    @property
+    def sentence(self) -> str:
+        """The curve in a sentence."""
+        of = split_unit(self.of)[0].replace("_", " ")
+        return f"A curve over the {of}, {self.key}, {self.words}; it is no cause."
 
     def as_dict(self) -> dict[str, Any]:
         """Return the JSON."""
@@ -151,11 +167,15 @@ class Curve:
 
 @dataclass(frozen=True)
 class Curves:
-    """The curves found, and the rigs with the credible effects alone (`before`) and with them."""
+    """The curves found, and the rig with the credible effects and with them.
+
+    `shrink` is the reduction of the gap in each channel that they change, with curves that are
+    fitted to the other stretches.
+    """
 
     found: tuple[Curve, ...]
-    before: Rig
     rig: Rig
+    shrink: tuple[ChannelShrink, ...]
 
 
 def find_curves(
@@ -172,14 +192,22 @@ def find_curves(
     if kept and len(kept) < len(choice.fit.effects):
         base = problem.fit(kept, choice.fit.values)
     found: list[Curve] = []
-    rig = base.rig
+    rig = half = base.rig
     while open_stages := _open_stages(case, choice, rig):
         one = _Fitter(case, problem, base, rig, choice.fit, records).best(open_stages)
         if one is None:
             break
-        curve, rig = one
+        curve, rig, made = one
         found.append(curve)
-    return Curves(tuple(found), base.rig, rig) if found else None
+        half = with_curve(half, case.control, made.law, *made.values) or half
+    if not found:
+        return None
+    closed = tuple(
+        channel_shrink(output, case.nominal, half, 1.0, improved=True)
+        for output in case.outputs
+        if not np.array_equal(output.residual(rig), output.residual(base.rig))
+    )
+    return Curves(tuple(found), rig, closed)
 
 
 def _open_stages(case: Case, choice: Choice, rig: Rig) -> set[str]:
@@ -352,25 +380,41 @@ def _with_nodes(basis: _Basis, sums: _Sums, at: Sequence[int]) -> _Pick:
     return _Pick(tuple(at), max(each, key=lambda one: one.log))
 
 
-def _choose(basis: _Basis, sums: _Sums) -> tuple[_Pick, _Pick]:
+def _choose(basis: _Basis, sums: _Sums, entries: Sequence[float]) -> tuple[_Pick, _Pick]:
     """Return the curve with the nodes of the largest evidence, and the straight line.
 
-    Nodes are added one by one. Two that gain only together are found: a node may lose evidence if
-    the next one gains more.
+    The search begins at the ends, and again at the entries of the schedule.
     """
-    first = sorted({0, len(basis.places) - 1, *np.flatnonzero(basis.places == 0.0).tolist()})
-    best = line = last = _with_nodes(basis, sums, first)
-    for _ in range(CURVE_NODES - len(first)):
+    ends = {0, len(basis.places) - 1, *np.flatnonzero(basis.places == 0.0).tolist()}
+    line = _with_nodes(basis, sums, sorted(ends))
+    own = ends | {*np.flatnonzero(np.isin(basis.places, entries)).tolist()}
+    starts = [line]
+    if len(ends) < len(own) < CURVE_NODES:
+        starts.append(_with_nodes(basis, sums, sorted(own)))
+    grown = [_grown(basis, sums, start, ends) for start in starts]
+    return max(grown, key=lambda one: one.known.log), line
+
+
+def _grown(basis: _Basis, sums: _Sums, start: _Pick, ends: set[int]) -> _Pick:
+    """Return a curve with nodes added one by one, and then taken away, as the evidence grows.
+
+    Two nodes that gain only together are found: one may lose evidence if the next gains more.
+    """
+    best = last = start
+    while len(last.at) < CURVE_NODES and len(last.at) <= len(best.at) + 1:
         more = [k for k in range(len(basis.places)) if k not in last.at]
         if not more:
             break
         tries = (_with_nodes(basis, sums, sorted((*last.at, k))) for k in more)
         last = max(tries, key=lambda one: one.known.log)
-        if last.known.log > best.known.log:
-            best = last
-        elif len(last.at) > len(best.at) + 1:
+        best = max(best, last, key=lambda one: one.known.log)
+    while inner := [k for k in best.at if k not in ends]:
+        fewer = [_with_nodes(basis, sums, [j for j in best.at if j != k]) for k in inner]
+        less = max(fewer, key=lambda one: one.known.log)
+        if less.known.log < best.known.log:
             break
-    return best, line
+        best = less
+    return best
 
 
 @dataclass(frozen=True)
@@ -400,10 +444,10 @@ class _Fitter:
     whole: Fit
     records: Sequence[Record]
 
-    def best(self, stages: set[str]) -> tuple[Curve, Rig] | None:
+    def best(self, stages: set[str]) -> tuple[Curve, Rig, _Made] | None:
         """Return the curve of the largest evidence that shows in stages; None if none holds.
 
-        With it is its rig.
+        With it are its rig, and the curve that is fitted to the fitted stretches.
         """
         begun = [one for law in LAWS if (one := self._begun(law, stages)) is not None]
         if not begun:
@@ -428,7 +472,7 @@ class _Fitter:
         if logs[at] < max(rivals) + RIVAL_GAIN or not self._bent(made):
             return None
         curve = self._stated(made, rig, pick)
-        return None if curve is None else (curve, rig)
+        return None if curve is None else (curve, rig, made)
 
     @cached_property
     def _variances(self) -> Floats:
@@ -503,7 +547,7 @@ class _Fitter:
         basis = self._basis(law, places, outputs, about)
         if basis is None:
             return None
-        pick, line = _choose(basis, basis.sums("fitted"))
+        pick, line = _choose(basis, basis.sums("fitted"), self._entries(law))
         values = pick.values(basis)
         rig = self._with(law, values)
         if rig is None:
@@ -515,6 +559,8 @@ class _Fitter:
     ) -> _Basis | None:
         """Return the responses about a curve; None if the stage does not respond."""
         step = self._step(law, outputs)
+        if law.signal == law.scale and law.by_size:  # friction by load grows less than the load
+            step = min(step, 0.3 * float(np.min(np.diff(places))))
         ends = places[[0, -1]]
         zero = np.array([0.0] if places[0] <= 0.0 <= places[-1] else [])
         nodes = np.union1d(ends, zero) if about is None else about[0]
@@ -603,7 +649,7 @@ class _Fitter:
             return None
         nodes, values = pick.values(made.basis)
         errors = pick.errors(made.basis)
-        of, unit = _units(self.rig, self.case.control, law)
+        of, lists, unit = _units(self.rig, self.case.control, law)
         shown = nodes + values if _kind(self.rig, self.case.control, law).MAP else values
         return Curve(
             key=f"controls.{self.case.control}.{law.key}",
@@ -618,6 +664,7 @@ class _Fitter:
             closed_low=held.low,
             closed_high=held.high,
             like=closed_form(made.basis, pick, self._entries(law)),
+            lists=lists,
         )
 
     def _drift(self, rig: Rig, outputs: Sequence[Output]) -> float:
@@ -642,11 +689,10 @@ def _kind(rig: Rig, control: ControlName, law: Law) -> type[RigCurve]:
     return type(getattr(getattr(rig.controls[control], section), name))
 
 
-def _units(rig: Rig, control: ControlName, law: Law) -> tuple[str, str]:
-    """Return the key of a law's nodes, and the unit of its values in text."""
-    of, values, *_ = file_keys(kind := _kind(rig, control, law), unit_of(control))
-    field = file_keys(kind, unit_of(control))[values]
-    return of, values.removeprefix(field).lstrip("_").replace("_per_", "/")
+def _units(rig: Rig, control: ControlName, law: Law) -> tuple[str, str, str]:
+    """Return the keys of a law's nodes and values, and the unit of its values in text."""
+    of, values, *_ = file_keys(_kind(rig, control, law), unit_of(control))
+    return of, values, split_unit(values)[1]
 
 
 def with_curve(
@@ -655,11 +701,15 @@ def with_curve(
     """Return the rig with a curve; None if no rig can have it.
 
     The values of a map are added to the signal. Neither a map nor a bend may fall: where one
-    would, it is flat.
+    would, it is flat. A curve of the schedule is constant beyond its nodes.
     """
     kind = _kind(rig, control, law)
     of, value, *_ = file_keys(kind, unit_of(control))
     given = values
+    if kind is GradientCurve:  # held at its ends, as the schedule's table
+        beyond = 0.01 * float(nodes[-1] - nodes[0])
+        nodes = np.concatenate(([nodes[0] - beyond], nodes, [nodes[-1] + beyond]))
+        given = np.pad(values, 1, "edge")
     if kind.MAP or kind is BendCurve:
         line = nodes * (1.0 if kind.MAP else _least_bend(rig, control))
         raised = np.maximum.accumulate(values + line)

@@ -16,13 +16,14 @@ from coupled.gap.findings.inflight import EffectInFlight, in_flight, in_words
 from coupled.gap.findings.inseparable import Alike
 from coupled.gap.findings.power import EffectPower, power
 from coupled.gap.findings.proposal import ProposedTest, in_one_line, next_tests
-from coupled.gap.findings.result import FORMAT, Findings
+from coupled.gap.findings.result import FORMAT, EffectResult, Findings
 from coupled.gap.findings.shrink import Shrink
 from coupled.gap.findings.summary import MISFIT, NOISE, filtered_words, summary
 from coupled.gap.search.case import Case
 from coupled.gap.search.found import Choice
 from coupled.gap.signals.output import Output
 from coupled.gap.signals.reading import worth_recording
+from coupled.gap.thresholds import CERTAIN
 from coupled.record.channels import ControlName
 from coupled.record.record import Record
 from coupled.results import TableResult, frame_of
@@ -91,6 +92,23 @@ class Diagnosis(Findings, TableResult):
         return () if self.curved is None else self.curved.found
 
     @property
+    def credible(self) -> tuple[EffectResult, ...]:
+        """The effects of the rig with the curves."""
+        return tuple(one for one in self.effects if one.probability >= CERTAIN)
+
+    @property
+    def with_curves(self) -> Rig:
+        """The rig with the credible effects and the curves; without curves, the improved rig."""
+        return self.improved if self.curved is None else self.curved.rig
+
+    @cached_property
+    def closed_loop_with_curves(self) -> tuple[ChannelAgain, ...] | None:
+        """The same as `closed_loop`, of the rig with the curves; None if there are none."""
+        if self.curved is None:
+            return None
+        return closed_loop(self.nominal, self.with_curves, self.control, self.first, self._again)
+
+    @property
     def first(self) -> Record:
         """The first record, with which flights and next tests are computed."""
         return next(iter(self.records.values()))
@@ -119,6 +137,13 @@ class Diagnosis(Findings, TableResult):
     def improves(self) -> bool:
         """Whether the improved rig's flight is no further from the record than the filed rig's."""
         return self.closed_loop is None or nearer(self.closed_loop)
+
+    @property
+    def improves_with_curves(self) -> bool:
+        """Whether the rig with the curves flies no further from the record than the filed rig."""
+        if self.curved is None:
+            return self.improves
+        return self.closed_loop_with_curves is None or nearer(self.closed_loop_with_curves)
 
     @cached_property
     def next_tests(self) -> tuple[ProposedTest, ...]:
@@ -149,6 +174,7 @@ class Diagnosis(Findings, TableResult):
         floor = MISFIT if missed else NOISE
         said = summary(self, self.shrink, flight, filtered, self.next_test, floor)
         said += "".join(f" Not distinguished: {one.words}." for one in self.inseparable)
+        said += "".join(f" {one.sentence}" for one in self.curves)
         held = "" if self.baseline is None else self.baseline.words
         changed = "" if self.change is None else self.change.words
         return " ".join(
@@ -170,6 +196,9 @@ class Diagnosis(Findings, TableResult):
             "settings": {one.name: one.factor for one in self.settings if one.yields is None},
         }
         found |= {one.name: one.yields for one in self.settings if one.yields is not None}
+        if self.curved is not None:
+            found["curves"] = [one.as_dict() for one in self.curves]
+            found["shrink"]["with_curves"] = [one.as_dict() for one in self.curved.shrink]
         if self.inseparable:
             found["inseparable"] = [one.as_dict() for one in self.inseparable]
         if self.filtered:
@@ -183,6 +212,9 @@ class Diagnosis(Findings, TableResult):
             found["healthy"] = self.baseline.as_dict() | compared
         if self.closed_loop is not None:
             found["closed_loop"] = {again.channel: again.as_dict() for again in self.closed_loop}
+        if self.closed_loop_with_curves is not None:
+            flown = self.closed_loop_with_curves
+            found["closed_loop_with_curves"] = {one.channel: one.as_dict() for one in flown}
         if self.in_flight is not None:
             found["in_flight"] = [one.as_dict() for one in self.in_flight]
         if self.next_tests:

@@ -1,0 +1,135 @@
+"""Curves: laws of one signal that the library lacks are described, and nothing else is."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from coupled.blind.twin.twin import Twin
+from coupled.gap.diagnose import diagnose
+from coupled.plots.gaps import draw_diagnosis
+from coupled.record.record import write_record
+from coupled.rig.rigfile import read_rig
+from coupled.tables.gaps import diagnosis_tables
+from tests.support.commands import coupled
+from tests.support.outside import RIG, Fault, curves_of, recorded
+
+COLUMN = RIG.controls["column"]
+TABLE = COLUMN.schedule
+QUADRATIC = 150.0  # N·s²/m²
+ENTRY, WRONG = 2, 1.1  # an entry of the schedule, and the factor by which it is off
+
+
+def by_the_square(twin: Twin, time_s: float, pressure_Pa: float) -> None:
+    twin.set(quadratic_damping=QUADRATIC)
+
+
+def wrong_entry(twin: Twin, time_s: float, pressure_Pa: float) -> None:
+    twin.numbers[0]["first"][ENTRY] = WRONG * TABLE.total_gradient[ENTRY]
+
+
+def fades(twin: Twin, time_s: float, pressure_Pa: float) -> None:
+    twin.set(damping=COLUMN.loader.damping * (1.0 + 1.5 * np.exp(-time_s / 7.0)))
+
+
+def jams(twin: Twin, time_s: float, pressure_Pa: float) -> None:
+    twin.set(damping=3000.0 if time_s % 7.0 > 6.0 else COLUMN.loader.damping)
+
+
+def drifts(twin: Twin, time_s: float, pressure_Pa: float) -> None:
+    twin.set(basic_gradient=COLUMN.loader.basic_gradient * (1.0 + 0.008 * time_s))
+
+
+def of_two_signals(twin: Twin, time_s: float, pressure_Pa: float) -> None:
+    """A force in proportion to the deflection times q̄."""
+    twin.set(basic_gradient=COLUMN.loader.basic_gradient + 0.1 * pressure_Pa)
+
+
+def healthy(twin: Twin, time_s: float, pressure_Pa: float) -> None:
+    """Leave the twin as its rig is."""
+
+
+def test_damping_by_the_square_of_the_speed_is_a_curve_over_the_rate() -> None:
+    found = curves_of(recorded(by_the_square))
+    assert found is not None
+    (curve,) = found.found
+    assert (curve.stage, curve.of, curve.unit) == ("loader", "rate_m_per_s", "N")
+    assert curve.like == "c·v·|v|"
+    assert curve.closed > 0.9
+    rate = np.array(curve.nodes)
+    # A straight line between two nodes is off by an eighth of c·h² at its middle, at most.
+    between = QUADRATIC * np.max(np.diff(rate)) ** 2 / 8.0
+    assert np.array(curve.values) == pytest.approx(QUADRATIC * rate**2, abs=between, rel=0.05)
+    assert np.all(np.array(curve.low) <= curve.values)
+    assert np.all(np.array(curve.high) >= curve.values)
+
+
+def test_a_wrong_entry_of_the_schedule_is_that_entry() -> None:
+    found = curves_of(recorded(wrong_entry))
+    assert found is not None
+    (curve,) = found.found
+    at = TABLE.dynamic_pressure[ENTRY]
+    assert (curve.stage, curve.of) == ("schedule", "dynamic_pressure_Pa")
+    assert curve.like == f"one entry, at {at:g} Pa"
+    off = float(np.interp(at, curve.nodes, curve.values))
+    assert off == pytest.approx((WRONG - 1.0) * TABLE.total_gradient[ENTRY], rel=0.02)
+    assert curve.closed > 0.9
+
+
+@pytest.mark.parametrize(
+    "fault",
+    [
+        healthy,
+        pytest.param(fades, marks=pytest.mark.slow),
+        pytest.param(jams, marks=pytest.mark.slow),
+        pytest.param(drifts, marks=pytest.mark.slow),
+        pytest.param(of_two_signals, marks=pytest.mark.slow),
+    ],
+)
+def test_what_is_no_function_of_one_signal_is_no_curve(fault: Fault) -> None:
+    assert curves_of(recorded(fault)) is None
+
+
+def test_curves_are_reported_drawn_and_written(tmp_path: Path) -> None:
+    record = recorded(wrong_entry).between(0.0, 12.0)
+    found = diagnose(RIG, {"r.csv": record})
+    assert found.verdict == "unexplained"  # a curve is no cause
+    assert found.effects == ()
+    (written,) = json.loads(json.dumps(found.as_dict(), allow_nan=False))["curves"]
+    assert {"of", "unit", "nodes", "values", "low", "high", "closed", "like"} <= set(written)
+    assert len({len(written[name]) for name in ("nodes", "values", "low", "high")}) == 1
+    shrunk = found.as_dict()["shrink"]["with_curves"]
+    assert shrunk[0]["channel"] == "column_gradient_N_per_m"
+    assert shrunk[0]["closed"] > 0.9
+    assert "it is no cause" in found.summary
+    captions = [table.caption for table in diagnosis_tables(found, power=False)]
+    assert any(caption.startswith("A curve of the schedule") for caption in captions)
+    assert "curves.png" in draw_diagnosis(found)
+    flown = found.closed_loop_with_curves
+    assert flown is not None
+    assert flown[0].after < 0.2 * flown[0].before
+
+
+@pytest.mark.slow
+def test_the_rig_with_curves_is_written_and_explains_the_record(tmp_path: Path) -> None:
+    write_record(recorded(wrong_entry), tmp_path / "r.csv")
+    RIG.save(tmp_path / "rig.toml")
+    words = ("diagnose", "r.csv", "--rig", "rig.toml", "--with-curves")
+    alone = coupled(tmp_path, *words)
+    assert alone.returncode == 2
+    assert "--with-curves" in alone.stderr
+    done = coupled(tmp_path, *words, "--improve", "new.toml")
+    assert done.returncode == 0, done.stderr
+    text = (tmp_path / "new.toml").read_text(encoding="utf-8")
+    assert "# added: controls.column.schedule.gradient_curve" in text
+    curve = read_rig(tmp_path / "new.toml").controls["column"].schedule.gradient_curve
+    assert len(curve.nodes) > 2
+    assert "with curves" in done.stdout
+    without = coupled(tmp_path, *words[:-1], "--improve", "plain.toml")
+    assert without.returncode == 0
+    assert not read_rig(tmp_path / "plain.toml").controls["column"].schedule.gradient_curve.nodes
+    again = coupled(tmp_path, "diagnose", "r.csv", "--rig", "./new.toml")
+    assert "No gap" in again.stdout
