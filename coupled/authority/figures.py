@@ -156,7 +156,7 @@ def _corrects_nothing(manoeuvre: Manoeuvre) -> bool:
 
 def _bends(manoeuvre: Manoeuvre) -> bool:
     loader = manoeuvre.rig.controls[manoeuvre.control].loader
-    return loader.bend > 0.0 or (loader.bend_push or 0.0) > 0.0
+    return bool(loader.bend > 0.0 or (loader.bend_push or 0.0) > 0.0 or loader.bend_curve.nodes)
 
 
 def named(flight: Flight) -> str:

@@ -71,7 +71,10 @@ def loader_rests(rig: Rig, control: ControlName, record: Record) -> bool:
 
 def breakaway_force(loader: Loader) -> float:
     """Return the breakaway force of a loader's dry friction, N."""
-    return max(loader.friction, loader.breakaway, loader.friction_pull, loader.friction_push)
+    curve = loader.friction_curve
+    ahead, back = curve.force[:1] or [0.0], curve.force_push[:1] or curve.force[:1] or [0.0]
+    added = max(loader.friction_pull + ahead[0], loader.friction_push + back[0])
+    return max(max(loader.friction, loader.breakaway) + added, 0.0)
 
 
 def predict_at_rest(

@@ -24,9 +24,10 @@ from numpy.typing import NDArray
 from scipy.optimize import nnls
 from scipy.stats import t as student
 
-from coupled.calibration.aircraftdata import Row, read_rows
+from coupled.calibration.aircraftdata import read_rows
 from coupled.errors import InputError
-from coupled.record.channels import ControlName, unit_of
+from coupled.record.channels import CONTROL_NAMES, ControlName, channel, unit_of
+from coupled.record.record import Record
 
 Floats = NDArray[np.float64]
 NEUTRAL = 0.01  # of the largest deflection: readings nearer to neutral are not used
@@ -35,6 +36,8 @@ GRID = 12  # nodes on a side to begin with
 MOVES = (0.5, 0.25, 0.125, 0.0625)  # of the grid's step
 EXACT = 1e-9  # of the largest force: a smaller residual is rounding
 LEAST_READINGS = 8
+READINGS = 400  # of a record: more rows are averaged, so that a fit takes seconds
+STEADY = 0.05  # of q̄: a larger change is another sweep
 
 
 @dataclass(frozen=True)
@@ -97,7 +100,47 @@ def read_sweep(path: Path, control: ControlName) -> Sweep:
         for q in np.unique(pressure):
             motion[pressure == q] = _motion(deflection[pressure == q])
     found = Sweep(deflection, force, pressure, motion)
-    _check(path, rows, found)
+    _check(path, [row.number for row in rows], found)
+    return found
+
+
+def swept_control(record: Record, file: Path) -> ControlName:
+    """Return the control whose force and deflection a record has; raises InputError."""
+    found = [
+        name
+        for name in CONTROL_NAMES
+        if channel(name, "force") in record and channel(name, "deflection") in record
+    ]
+    if not found:
+        problem = "has no force and deflection of a control; its map should name both"
+        raise InputError(file, "--feel", problem)
+    moved = {name: float(np.ptp(record[channel(name, "deflection")])) for name in found}
+    away = [name for name in found if moved[name] > 0.1 * max(moved.values())]
+    if len(away) > 1:
+        problem = f"moves {' and '.join(away)}; give the log of a sweep of one control"
+        raise InputError(file, "--feel", problem)
+    return away[0]
+
+
+def sweep_of_record(record: Record, control: ControlName, file: Path) -> Sweep:
+    """Return the readings of a slow sweep of a control in a record, means of a few rows each.
+
+    The sweep is at one dynamic pressure, its mean; 0 where the record has none. Raises InputError
+    that names `file`.
+    """
+    name, q = channel(control, "deflection"), "dynamic_pressure_Pa"
+    pressure = record[q] if q in record else np.zeros(len(record))
+    low, high = float(np.min(pressure)), float(np.max(pressure))
+    if high - low > STEADY * max(abs(low), abs(high)):
+        problem = f"q̄ goes from {low:.4g} to {high:.4g} Pa; give the log of a sweep at one q̄"
+        raise InputError(file, q, problem)
+    count = min(len(record), READINGS)
+    parts = np.array_split(np.arange(len(record)), count)
+    deflection = np.array([np.mean(record[name][rows]) for rows in parts])
+    force = np.array([np.mean(record[channel(control, "force")][rows]) for rows in parts])
+    level = np.full(count, float(np.mean(pressure)))
+    found = Sweep(deflection, force, level, _motion(deflection))
+    _check(file, [int(rows[0]) + 2 for rows in parts], found)
     return found
 
 
@@ -121,8 +164,8 @@ def _motion(deflection: Floats) -> Floats:
     return motion
 
 
-def _check(path: Path, rows: Sequence[Row], sweep: Sweep) -> None:
-    """Refuse readings that do not determine friction and curve."""
+def _check(path: Path, numbers: Sequence[int], sweep: Sweep) -> None:
+    """Refuse readings that do not determine friction and curve; `numbers` are their rows."""
     outward = sweep.motion * np.sign(sweep.deflection)
     for q in np.unique(sweep.pressure):
         here = sweep.pressure == q
@@ -137,7 +180,7 @@ def _check(path: Path, rows: Sequence[Row], sweep: Sweep) -> None:
     pull = sweep.deflection * sweep.force
     if float(np.sum(pull)) <= 0.0:
         problem = "has forces against the deflections, or none; a pull is positive in both"
-        raise InputError(path, f"row {rows[int(np.argmin(pull))].number}", problem)
+        raise InputError(path, f"row {numbers[int(np.argmin(pull))]}", problem)
 
 
 def fit_feel(sweep: Sweep) -> Feel:

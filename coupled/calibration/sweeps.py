@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from coupled.authority.held import breakaway_force
 from coupled.calibration.plan import gradient_sets
 from coupled.errors import InputError
 from coupled.record.channels import ControlName
@@ -63,7 +64,7 @@ def sweep(rig: Rig, control: ControlName, pressure_Pa: float) -> History:
     force = np.where(np.abs(path) < tiny, preload * force, force)
     turns = [0.0, TURN_s, quarter, quarter + TURN_s, 3.0 * quarter, 3.0 * quarter + TURN_s]
     side = np.interp(ends, turns, [0.0, 1.0, 1.0, -1.0, -1.0, 1.0])
-    force = force + side * max(data.loader.friction, data.loader.breakaway)
+    force = force + side * breakaway_force(data.loader)
     nodes = np.interp(nodes_of(rig, frames), ends, force)
     return run_control(rig, control, nodes, np.full(frames, pressure_Pa))
 
@@ -83,7 +84,7 @@ def release(rig: Rig, control: ControlName, pressure_Pa: float, side: float) -> 
     pull = np.minimum(times / (0.25 * HELD_s), 1.0)
     held_nodes = last * rig.substeps + 1
     nodes[:held_nodes] = force * pull[:held_nodes]
-    friction = max(rig.controls[control].loader.friction, rig.controls[control].loader.breakaway)
+    friction = breakaway_force(rig.controls[control].loader)
     nodes[:held_nodes] += side * friction * pull[:held_nodes]
     response = run_control(rig, control, nodes, np.full(frames, pressure_Pa))
     start = float(response.deflection[last])

@@ -9,15 +9,20 @@ import typer
 from rich.markup import escape
 
 from coupled.cli.app import JsonOption, app
+from coupled.cli.feel import keep_feel, print_feel
+from coupled.cli.new import check_new
 from coupled.cli.terminal import check_json, keep_json, out, print_json, say
-from coupled.errors import InputError
+from coupled.errors import InputError, shown
 from coupled.files import check_target
 from coupled.outputs import Outputs
 from coupled.resources import find, shipped_rigs
 
 if TYPE_CHECKING:
+    from coupled.calibration.feel import Feel
+    from coupled.record.channels import ControlName
     from coupled.record.importing.account import ClockAccount, ImportAccount
     from coupled.record.importing.suggest.propose import Proposal
+    from coupled.record.record import Record
     from coupled.rig.rig import Rig
 
 _LISTED = 12  # unmapped columns named on the terminal; the manifest has all
@@ -63,6 +68,14 @@ def import_log(
     rig: Annotated[
         str, typer.Option(help="Hold it against a rig file, or the name of a shipped one.")
     ] = "",
+    feel: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="CURVE.toml",
+            help="Of a slow sweep of one control, out and back, write breakout, friction and curve "
+            "too, with a plot.",
+        ),
+    ] = None,
     json_file: JsonOption = "",
 ) -> None:
     """Convert your own log to a record, and report whether each channel is plausible."""
@@ -74,9 +87,11 @@ def import_log(
     if suggest is not None:
         if output is not None:
             raise InputError("coupled import", "--output", "goes with --map, not with --suggest")
+        if feel is not None:
+            raise InputError("coupled import", "--feel", "goes with --map, not with --suggest")
         _suggest(logs, suggest, rig_file, inputs, json_file)
     else:
-        _convert(logs, map_file, output, rig_file, inputs, json_file)
+        _convert(logs, map_file, output, rig_file, inputs, json_file, feel)
 
 
 def _rig(rig_file: Path | None) -> Rig | None:
@@ -92,6 +107,7 @@ def _convert(
     rig_file: Path | None,
     inputs: list[Path],
     json_file: str,
+    feel: Path | None,
 ) -> None:
     from coupled.record.importing.convert import import_log as import_file
     from coupled.record.importing.heads import known_map
@@ -101,13 +117,20 @@ def _convert(
     inputs = [*inputs, *([map_file] if map_file else [])]
     program = known_map(logs[0])[0] if map_file is None else ""
     check_suffix(path)
-    for target in (path, manifest_path(path)):
+    written = [path, manifest_path(path)]
+    if feel is not None:
+        check_new(feel, ".toml")
+        written += [feel, feel.with_suffix(".png")]
+    for target in written:
         check_target(target, inputs)
-    check_json(json_file, [*inputs, path, manifest_path(path)])
+    check_json(json_file, [*inputs, *written])
     record, account = import_file(logs, map_file, _rig(rig_file))
     table = {"record": str(path), **account.as_dict()}
+    found = None if feel is None else _felt(record, logs[0])
     with Outputs() as outputs:
         write_record(record, outputs.at(path))
+        if feel is not None and found is not None:
+            keep_feel(found[1], found[0], shown(logs[0].name), feel, outputs)
         keep_json(table, json_file, outputs)
     if json_file != "-":
         if program:
@@ -115,7 +138,17 @@ def _convert(
         _print_account(account)
         say(f"record: {path}  ({len(record)} rows, {len(record.channels)} channels)")
         say(f"manifest: {manifest_path(path)}")
+        if feel is not None and found is not None:
+            print_feel(found[1], feel)
     print_json(table, json_file)
+
+
+def _felt(record: Record, log: Path) -> tuple[ControlName, Feel]:
+    """Return the control that a log sweeps, and what is felt there."""
+    from coupled.calibration.feel import fit_feel, sweep_of_record, swept_control
+
+    control = swept_control(record, log)
+    return control, fit_feel(sweep_of_record(record, control, log))
 
 
 def _suggest(

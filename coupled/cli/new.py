@@ -11,7 +11,6 @@ from coupled.cli.app import UnitsOption, app
 from coupled.cli.progress import progress
 from coupled.cli.rigs import ControlOption, rig_and_control
 from coupled.cli.terminal import say
-from coupled.display import in_system
 from coupled.errors import InputError, nearest, shown
 from coupled.files import check_target, path_from, read_text, write_text
 from coupled.outputs import Outputs
@@ -103,35 +102,19 @@ def feel(
     units: UnitsOption = "si",
 ) -> None:
     """Write a schedule's curve, breakout and friction from a sweep of the aircraft's control."""
-    from coupled.calibration.feel import feel_text, fit_feel, read_sweep
-    from coupled.plots.feel import draw_sweep
-    from coupled.plots.saving import save
+    from coupled.calibration.feel import fit_feel, read_sweep
+    from coupled.cli.feel import keep_feel, print_feel
 
     named = next((name for name in CONTROL_NAMES if name == control), None)
     if named is None:
         hint = nearest(control, CONTROL_NAMES)
         raise InputError("new feel", "--control", f"no {control!r}; {hint}")
     check_new(file, ".toml")
-    plot = file.with_suffix(".png")
-    check_target(plot, [readings])
+    check_target(file.with_suffix(".png"), [readings])
     found = fit_feel(read_sweep(readings, named))
-    text = feel_text(found, named, shown(readings.name))
-    with progress("drawing the plot"), Outputs() as outputs:
-        write_text(outputs.at(file), text)
-        save(draw_sweep(found, named, shown(readings.name), units), outputs.at(plot))
-    newtons = in_system("N", units)
-    for what, value, half in (
-        ("breakout", found.breakout_N, found.breakout_half_width_N),
-        ("friction", found.friction_N, found.friction_half_width_N),
-        ("residual RMS", found.rms_N, 0.0),
-    ):
-        wide = f" ± {newtons.factor * half:.2g}" if half else ""
-        say(f"{what:13}{newtons.factor * value:.4g}{wide} {newtons.unit}")
-    segments = len(found.deflection) - 1
-    sides = "for both sides" if found.deflection[0] == 0.0 else "over both sides"
-    say(f"{'curve':13}{segments} segments {sides}, at {len(found.pressure)} q̄")
-    say(f"written: {file}, {plot}")
-    say(f"next: compare them in {plot.name}, then put the keys of {file.name} in a rig file")
+    with Outputs() as outputs:
+        keep_feel(found, named, shown(readings.name), file, outputs, units)
+    print_feel(found, file, units)
 
 
 def _run_for(rig: str, control: str, file: Path) -> str:

@@ -13,6 +13,7 @@ from coupled.errors import InputError
 from coupled.flight.altered import ALTERATIONS, alterations
 from coupled.flight.loading import INERTIAS
 from coupled.record.channels import unit_of
+from coupled.rig.curves import Curve
 from coupled.rig.parameters import (
     Calibration,
     Compensation,
@@ -181,6 +182,11 @@ def _sections(rig: Rig) -> Iterator[tuple[Section, str, str]]:
 
 def _check_section(section: Section, path: str, d: str, file: object) -> list[str]:
     kind = type(section)
+    if isinstance(section, Curve):
+        if section.nodes:
+            problem = "a curve is not exported to JSBSim; remove the table, or export an FMU"
+            raise InputError(file, path, problem)
+        return []
     exported = EXPORTED.get(kind, frozenset())
     without, refused = WITHOUT_EFFECT.get(kind, {}), REFUSED.get(kind, {})
     left = list[str]()

@@ -264,7 +264,8 @@ def configure(rig: Rig, configuration: Configuration) -> Rig:
         if configuration == "rigid":
             d = unit_of(name)
             changes |= {f"{loader}.bend_{d}_per_N": 0.0, f"{host}.bend_{d}_per_N": 0.0}
-            changes |= {f"{loader}.bend_push_{d}_per_N": None, "structure": Structure()}
+            changes |= {f"{loader}.bend_push_{d}_per_N": None, f"{loader}.bend_curve": {}}
+            changes["structure"] = Structure()
         changes[f"{host}.deflection"] = configuration in ("deflection only", "compensated")
         changes[f"{host}.gradient"] = configuration in ("gradient only", "compensated")
         if configuration == "calibrated low":

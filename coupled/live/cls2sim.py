@@ -144,6 +144,7 @@ class External(_Cls2Sim):
         rate, self._last[i] = (computed - self._last[i]) / self._frame_s, computed
         sign = math.copysign(1.0, computed) if computed != 0.0 else 0.0
         elastic = (loader.basic_gradient + loader.cubic * computed * computed) * computed
+        elastic += float(loader.force_curve.at(computed))
         return elastic + loader.breakout * sign + loader.damping * rate
 
     def send(self, orders: tuple[Order, ...], mode: int) -> None:

@@ -121,7 +121,7 @@ def _missing(scene: Scene, rig: Rig | None) -> Floats:
     held = loader.friction * np.sign(speed) + loader.breakout * np.sign(at) - loader.offset
     if loader.bob_weight:
         held = held + loader.bob_weight * (scene.smooth("load_factor") - 1.0)
-    spring = loader.basic_gradient * at + loader.cubic * at**3
+    spring = loader.basic_gradient * at + loader.cubic * at**3 + loader.force_curve.at(at)
     left = scene.smooth("force") - moved - spring - product - held
     sticks = (loader.friction > 0.0) & (np.abs(speed) < STICKS * np.std(speed))
     sticks |= (loader.breakout > 0.0) & (np.abs(at) < STICKS * np.std(at))

@@ -154,3 +154,94 @@ def test_the_command_writes_a_schedule_that_a_rig_takes(tmp_path: Path) -> None:
     again = coupled(tmp_path, "new", "feel", "sweep.csv", "feel.toml")
     assert again.returncode == 2
     assert "is there already" in again.stderr
+
+
+LOG_MAP = """[clock]
+from = "t"
+[channels.column_force_N]
+from = "pull"
+unit = "lbf"
+[channels.column_deflection_m]
+from = "column"
+unit = "mm"
+[channels.wheel_force_N]
+from = "rim"
+unit = "N"
+[channels.wheel_deflection_rad]
+from = "wheel"
+unit = "rad"
+[channels.dynamic_pressure_Pa]
+from = "q"
+unit = "Pa"
+"""
+
+
+def logged(folder: Path, pressure: float = 3000.0, wheel: float = 0.001) -> Path:
+    """Write the log of a slow sweep of the column at 50 Hz, while q̄ and wheel change a little."""
+    at, motion = swept(-NODES[-1], NODES[-1], 4000)
+    felt = np.sign(at) * (BREAKOUT_N + np.interp(np.abs(at), NODES, FORCES[3000.0]))
+    felt += FRICTION_N * motion + NOISE_N * np.random.default_rng(7).standard_normal(len(at))
+    time, share = 0.02 * np.arange(len(at)), np.linspace(0.0, 1.0, len(at))
+    rim, turned = 5.0 * share, wheel * np.sin(6.0 * share)
+    told = 3000.0 + (pressure - 3000.0) * share
+    columns = np.stack((time, felt / 4.4482216, 1e3 * at, rim, turned, told), axis=1)
+    np.savetxt(
+        folder / "log.csv",
+        columns,
+        fmt="%.8g",
+        delimiter=",",
+        header="t,pull,column,rim,wheel,q",
+        comments="",
+    )
+    (folder / "map.toml").write_text(LOG_MAP, encoding="utf-8")
+    return folder / "log.csv"
+
+
+IMPORT = ("import", "log.csv", "--map", "map.toml", "--feel", "feel.toml")
+
+
+def test_a_logged_sweep_gives_record_and_curve(tmp_path: Path) -> None:
+    logged(tmp_path, pressure=3020.0)
+    done = coupled(tmp_path, *IMPORT)
+    assert done.returncode == 0, done.stderr
+    assert "segments for both sides, at 1 q̄" in done.stdout
+    assert (tmp_path / "out" / "log.csv").is_file()
+    assert (tmp_path / "feel.png").stat().st_size > 10_000
+    column = load_toml(tmp_path / "feel.toml")["controls"]["column"]
+    assert column["loader"]["breakout_N"] == pytest.approx(BREAKOUT_N, abs=0.3)
+    assert column["loader"]["friction_N"] == pytest.approx(FRICTION_N, abs=0.1)
+    schedule = column["schedule"]
+    assert schedule["dynamic_pressure_Pa"] == pytest.approx([3010.0], abs=1.0)
+    assert schedule["deflection_m"][-1] == pytest.approx(NODES[-1], rel=0.01)
+    felt = np.interp(NODES[1:-1], schedule["deflection_m"], schedule["force_N"][0])
+    assert felt == pytest.approx(FORCES[3000.0][1:-1], abs=0.5)
+
+
+@pytest.mark.parametrize(
+    ("log", "words", "said"),
+    [
+        ({"pressure": 4000.0}, IMPORT, "q̄ goes from 3000 to 4000 Pa"),
+        ({"wheel": 0.5}, IMPORT, "moves column and wheel"),
+        ({}, ("import", "log.csv", "--suggest", "m.toml", "--feel", "f.toml"), "goes with --map"),
+        ({}, (*IMPORT[:-1], "feel.csv"), "ends in .toml"),
+    ],
+)
+def test_a_log_that_is_no_sweep_is_one_line(
+    tmp_path: Path, log: dict[str, float], words: tuple[str, ...], said: str
+) -> None:
+    logged(tmp_path, **log)
+    done = coupled(tmp_path, *words)
+    assert done.returncode == 2
+    assert said in " ".join(done.stderr.split())
+    assert {file.name for file in tmp_path.iterdir()} == {"log.csv", "map.toml"}
+
+
+def test_a_record_without_forces_is_no_sweep(tmp_path: Path) -> None:
+    logged(tmp_path)
+    pulled = '[channels.column_force_N]\nfrom = "pull"\nunit = "lbf"\n'
+    turned = '[channels.wheel_force_N]\nfrom = "rim"\nunit = "N"\n'
+    text = LOG_MAP.replace(pulled, "").replace(turned, "")
+    (tmp_path / "map.toml").write_text(text, encoding="utf-8")
+    done = coupled(tmp_path, *IMPORT)
+    assert done.returncode == 2
+    assert "has no force and deflection of a control" in " ".join(done.stderr.split())

@@ -118,8 +118,11 @@ def filed(rig: Rig, name: ControlName, kind: Kind) -> float | None:
 def gradient_range(control: Control) -> tuple[float, float]:
     """Return the softest and stiffest gradient of a schedule, N/d."""
     table = control.schedule
-    every = [g[0] + table.slope * (value - g[0]) for g in table.segments for value in g]
-    return min(every), max(every)
+    places = np.array(sorted({*table.dynamic_pressure, *table.gradient_curve.nodes}))
+    added = table.gradient_curve.at(places)
+    sloped = [[g[0] + table.slope * (value - g[0]) for value in g] for g in table.segments]
+    every = [np.interp(places, table.dynamic_pressure, g) + added for g in sloped]
+    return float(np.min(every)), float(np.max(every))
 
 
 @dataclass(frozen=True)

@@ -149,6 +149,8 @@ def _linear(rig: Rig, name: ControlName, gradient: float) -> Rig:
         f"schedule.total_gradient_N_per_{d}": [gradient, gradient],
         f"schedule.break_deflection_{d}": 0.0,
         "schedule.slope": 1.0,
+        "schedule.gradient_curve": {},
+        "loader.load_curve": {},
         "compensation.breakout_N": 0.0,
         "sensing.word_length_bits": 0,
         f"schedule.second_gradient_N_per_{d}": None,

@@ -14,6 +14,7 @@ from coupled.authority.stability.limits import (
     disagreement,
     stability_limits,
 )
+from coupled.authority.stability.local import about_rest
 from coupled.authority.stability.planes import Kind, Plane, kinds_of, plane
 from coupled.errors import InputError, nearest
 from coupled.record.channels import ControlName, unit_of
@@ -111,7 +112,8 @@ def compliant_controls(
     if not names:
         problem = f"no {control!r}; {nearest(str(control), rig.controls)}"
         raise InputError(file, key, problem)
-    bent = [name for name in names if rig.controls[name].loader.bend > 0.0]
+    local = about_rest(rig)
+    bent = [name for name in names if local.controls[name].loader.bend > 0.0]
     if not bent:
         key = f"controls.{names[0]}.loader.bend_{unit_of(names[0])}_per_N"
         raise InputError(file, key, "is 0 and nothing bends; a map over K·G_T needs a K above 0")
@@ -121,7 +123,8 @@ def compliant_controls(
 def map_stability(
     rig: Rig, bent: Sequence[ControlName], progress: Progress | None = None
 ) -> Stability:
-    """Return where a rig is stable, on controls that bend."""
+    """Return where a rig is stable for small motions, on controls that bend."""
+    rig = about_rest(rig)
     asked = [(name, kind) for name in bent for kind in kinds_of(rig.controls[name])]
     limits = tuple(stability_limits(rig, name) for name in bent)
     bob = bob_weight(rig, rig.file or Path(rig.name)) if "column" in bent else None
