@@ -138,6 +138,8 @@ def diagnose(
         with out.widened(wide):
             _print(whole, power, (None if worse else improve, drawn), units)
         say_report(report)
+        if with_curves and not whole.curves:
+            say("no curve describes what the effects leave; --with-curves adds none")
         if worse:
             say(f"not written: {improve}. With it the flight stays further from the record")
     print_json(table, json_file)

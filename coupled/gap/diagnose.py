@@ -83,10 +83,10 @@ def findings(prepared: Prepared, case: Case, choice: Choice) -> Diagnosis:
     baseline, records = prepared.baseline, list(prepared.records.values())
     change = None if baseline is None else baseline.compared(records, prepared.case.outputs)
     verdict = verdict_of(choice, stages, effects, budget)
+    verdict, stages = beside_healthy(verdict, stages, baseline, change)
     curves = None
     if verdict in ("mostly", "unexplained"):
         curves = find_curves(case, choice, effects, [reader.record for reader in readers])
-    verdict, stages = beside_healthy(verdict, stages, baseline, change)
     return Diagnosis(
         control=control,
         verdict=verdict,
