@@ -165,7 +165,8 @@ def _diagnose(
     with progress() as advance:
         whole = find_gap(nominal, read, control, advance, well)
         advance("flying again, and looking for the next test", 0, 1)
-        _ = whole.closed_loop, whole.in_flight, whole.next_tests  # here, where progress is shown
+        # Computed here, where progress is shown.
+        _ = whole.closed_loop, whole.closed_loop_with_curves, whole.in_flight, whole.next_tests
     return whole, read
 
 

@@ -121,14 +121,17 @@ def test_a_curve_is_reported_and_drawn_and_no_cause(entry: Diagnosis) -> None:
     assert len(draw_curves(View(entry)).axes) == 1
 
 
+def test_curves_are_written_to_an_improved_rig_only(tmp_path: Path) -> None:
+    done = coupled(tmp_path, "diagnose", "r.csv", "--rig", "bench", "--with-curves")
+    assert done.returncode == 2
+    assert done.stderr == "error: r.csv: --with-curves: is for --improve NEW.toml\n"
+
+
 @pytest.mark.slow
 def test_the_rig_with_curves_is_written_and_explains_the_record(tmp_path: Path) -> None:
     write_record(recorded(wrong_entry), tmp_path / "r.csv")
     RIG.save(tmp_path / "rig.toml")
     words = ("diagnose", "r.csv", "--rig", "rig.toml", "--with-curves")
-    alone = coupled(tmp_path, *words)
-    assert alone.returncode == 2
-    assert "--with-curves" in alone.stderr
     more = ("--improve", "new.toml", "--json", "d.json", "--plots", "figures")
     done = coupled(tmp_path, *words, *more)
     assert done.returncode == 0, done.stderr
