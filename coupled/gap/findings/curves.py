@@ -201,15 +201,15 @@ class _Fitter:
         With it are its rig, and the curve that is fitted to the fitted stretches.
         """
         begun = [one for law in LAWS if (one := self._begun(law, stages)) is not None]
-        if not begun:
-            return None
         gains = [one.likelihood - self._likelihood(one.basis, self.rig) for one in begun]
+        if max(gains, default=0.0) <= 0.0:
+            return None
         near = [
             self._refined(one)
             for one, gain in zip(begun, gains, strict=True)
             if gain > CURVE_NEAR * max(gains)
         ]
-        ends = [one for made in near if (one := self._whole(made)) is not None]
+        ends = [end for made in near if (end := self._whole(made)) is not None]
         if not ends:
             return None
         without = evidence(self.problem, replace(self.base, rig=self.rig), self._variances)
@@ -279,11 +279,8 @@ class _Fitter:
             return CURVE_STEP
         name = f"{self.case.control}_{named(law.scale, self.case.control)}"
         record = self.records[outputs[0].record]
-        name = (
-            name
-            if name in record
-            else f"{self.case.control}_deflection_{unit_of(self.case.control)}"
-        )
+        if name not in record:  # δc
+            name = f"{self.case.control}_deflection_{unit_of(self.case.control)}"
         return CURVE_STEP * float(np.sqrt(np.mean(record[name] ** 2)))
 
     def _with(self, law: Law, values: Values) -> Rig | None:
