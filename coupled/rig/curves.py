@@ -21,20 +21,23 @@ MOST_NODES = 24  # of a curve
 
 
 class Curve(Section):
-    """A function of one signal: its first list has the nodes, its second the values."""
+    """A function of one signal: `LISTS` are its fields of nodes and values."""
 
+    LISTS: ClassVar[tuple[str, str]]
     SIGNED: ClassVar[bool] = True  # the signal has both signs
     MAP: ClassVar[bool] = False  # the value replaces the signal; others are added to a law
 
     @property
     def nodes(self) -> list[float]:
         """The values of the signal, rising."""
-        return self._lists()[0]
+        found: list[float] = getattr(self, self.LISTS[0])
+        return found
 
     @property
     def values(self) -> list[float]:
         """The value of the function at each node."""
-        return self._lists()[1]
+        found: list[float] = getattr(self, self.LISTS[1])
+        return found
 
     @property
     def odd(self) -> bool:
@@ -59,14 +62,11 @@ class Curve(Section):
         pairs = pairwise(zip(self.nodes, self.values, strict=True))
         return [(b - a) / (after - before) for (before, a), (after, b) in pairs]
 
-    def _lists(self) -> tuple[list[float], list[float]]:
-        first, second, *_ = type(self).model_fields
-        found: tuple[list[float], list[float]] = getattr(self, first), getattr(self, second)
-        return found
-
 
 class SpringCurve(Curve):
     """A force against δc by its distance from neutral, added to the loader's springs."""
+
+    LISTS = ("deflection", "force")
 
     deflection: list[float] = quantity("{d}", [])
     force: list[float] = quantity("N", [])
@@ -79,6 +79,7 @@ class FrictionCurve(Curve):
     """
 
     SIGNED = False
+    LISTS = ("rate", "force")
 
     rate: list[float] = quantity("{d}_per_s", [])
     force: list[float] = quantity("N", [])
@@ -89,6 +90,7 @@ class LoadCurve(Curve):
     """Dry friction by the size of the force carried, added to the friction."""
 
     SIGNED = False
+    LISTS = ("load", "friction")
 
     load: list[float] = quantity("N", [])
     friction: list[float] = quantity("N", [])
@@ -96,6 +98,8 @@ class LoadCurve(Curve):
 
 class BendCurve(Curve):
     """A bend of the structure by the force on the grip, added to K·F."""
+
+    LISTS = ("force", "bend")
 
     force: list[float] = quantity("N", [])
     bend: list[float] = quantity("{d}", [])
@@ -105,6 +109,7 @@ class DeflectionReading(Curve):
     """The reading of δc by the host over δc, before the scales of `Sensing`."""
 
     MAP = True
+    LISTS = ("deflection", "reading")
 
     deflection: list[float] = quantity("{d}", [])
     reading: list[float] = quantity("{d}", [])
@@ -114,6 +119,7 @@ class ForceReading(Curve):
     """The reading of F by the host over F, before the scale of `Sensing`."""
 
     MAP = True
+    LISTS = ("force", "reading")
 
     force: list[float] = quantity("N", [])
     reading: list[float] = quantity("N", [])
@@ -123,6 +129,7 @@ class GradientCurve(Curve):
     """A gradient by the schedule's q̄, added to G_T of every segment."""
 
     SIGNED = False
+    LISTS = ("dynamic_pressure", "gradient")
 
     dynamic_pressure: list[float] = quantity("Pa", [])
     gradient: list[float] = quantity("N_per_{d}", [])
@@ -132,6 +139,7 @@ class CommandCurve(Curve):
     """The command of the surface over δ̂ as a share of the travel, pull positive; 1 is all of it."""
 
     MAP = True
+    LISTS = ("deflection", "command")
 
     deflection: list[float] = quantity("norm", [])
     command: list[float] = quantity("norm", [])

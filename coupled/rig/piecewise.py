@@ -30,18 +30,18 @@ def count_of(curve: Curve) -> int:
 
 def table_of(curve: Curve) -> Floats:
     """Return a curve's table for the kernels."""
-    nodes, values = np.array(curve.nodes), np.array(curve.values)
-    if not len(nodes):
+    if not curve.nodes:
         return _ABSENT
+    nodes, values = np.array(curve.nodes), np.array(curve.values)
     values = values - nodes if curve.MAP else values
     return _table(*_to_both_sides(nodes, values, values)) if curve.odd else _table(nodes, values)
 
 
 def damping_table(curve: FrictionCurve) -> Floats:
     """Return the table over the signed rate of a friction curve, without its dry friction."""
-    nodes, ahead = np.array(curve.nodes), np.array(curve.values)
-    if not len(nodes):
+    if not curve.nodes:
         return _ABSENT
+    nodes, ahead = np.array(curve.nodes), np.array(curve.values)
     back = np.array(curve.force_push or curve.values)
     return _table(*_to_both_sides(nodes, ahead - ahead[0], back - back[0]))
 

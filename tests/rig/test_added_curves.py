@@ -121,6 +121,11 @@ EQUAL: dict[str, tuple[dict[str, Any], dict[str, Any], dict[str, Any]]] = {
         {"load_curve": line("load_N", "friction_N", 0.2, 80.0)},
         {},
     ),
+    "friction at any load": (
+        {"friction_N": 3.0},
+        {"load_curve": {"load_N": [0.0, 50.0], "friction_N": [3.0, 3.0]}},
+        {},
+    ),
     "a bend": (
         {"bend_m_per_N": 3e-4},
         {"bend_curve": line("force_N", "bend_m", 3e-4 - 9.136e-5, 60.0)},
@@ -328,7 +333,9 @@ def test_the_statics_have_each_curve() -> None:
     first, second = (static_line(each, "column", 1500.0, at) for each in (plain, rig))
     np.testing.assert_allclose(second.force - first.force, 90.0 * at, rtol=1e-11)
     bend = rig.controls["column"].loader.bend
-    bent = bend * second.force + np.sign(at) * np.interp(np.abs(second.force), *bends.values())
+    bent = bend * second.force + np.sign(at) * np.interp(
+        np.abs(second.force), bends["force_N"], bends["bend_m"]
+    )
     beyond = np.maximum(np.abs(second.force) - 80.0, 0.0) * 1e-4 * np.sign(at)
     np.testing.assert_allclose(second.deflection, at + bent + beyond, rtol=1e-11)
     read = np.where(second.force > 0.0, 1.2, 1.0) * second.force
