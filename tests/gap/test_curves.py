@@ -13,6 +13,7 @@ from coupled.gap.diagnose import findings
 from coupled.gap.findings.diagnosis import Diagnosis
 from coupled.gap.prepare import prepare
 from coupled.gap.search.beam import search_sets
+from coupled.gap.signals.sensed import Sensed
 from coupled.plots.curves import draw_curves
 from coupled.plots.gapview import View
 from coupled.record.record import write_record
@@ -119,6 +120,18 @@ def test_a_curve_is_reported_and_drawn_and_no_cause(entry: Diagnosis) -> None:
     assert table.caption.startswith("A curve of the schedule, no cause; it closes ")
     assert table.heads[1] == "controls.column.schedule.gradient_curve, lb/in"
     assert len(draw_curves(View(entry)).axes) == 1
+
+
+@pytest.mark.parametrize("first", [0.0, -0.02])
+def test_a_reading_is_inverted_along_its_curve(first: float) -> None:
+    nodes = [first, 0.01, 0.03]
+    reading = [1.3 * nodes[0], 0.013, 0.025]
+    key = "controls.column.sensing.deflection_curve"
+    curved = RIG.changed({key: {"deflection_m": nodes, "reading_m": reading}})
+    sensed = Sensed(curved, "column")
+    true = np.linspace(-0.04, 0.04, 41)
+    assert not np.allclose(sensed.along_curve(true), true)
+    assert sensed.before_curve(sensed.along_curve(true)) == pytest.approx(true, abs=1e-7)
 
 
 def test_curves_are_written_to_an_improved_rig_only(tmp_path: Path) -> None:

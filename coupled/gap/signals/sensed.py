@@ -122,4 +122,4 @@ def _inverse(curve: Curve, values: Floats) -> Floats:
     at = np.concatenate(([least], -nodes[::-1] if curve.odd else [], nodes, [far]))
     at = np.unique(at)
     found = curve.at(at)
-    return np.interp(values, found + FLAT_SLOPE * at, at)
+    return np.asarray(np.interp(values, found + FLAT_SLOPE * at, at))
