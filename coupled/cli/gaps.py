@@ -59,12 +59,19 @@ def diagnose(
     improve: Annotated[
         Path | None, typer.Option(metavar="NEW.toml", help="Write the rig with the effects found.")
     ] = None,
+    with_curves: Annotated[
+        bool,
+        typer.Option(
+            "--with-curves",
+            help="With --improve: write the curves, too, that describe what no effect explains.",
+        ),
+    ] = False,
     plots: Annotated[
         Path | None,
         typer.Option(
             metavar="DIR",
-            help="Draw the figures ladder, stages and signature there; of several controls, those"
-            " of each with a gap, and of the airframe.",
+            help="Draw the figures ladder, stages, signature and curves there; of several controls,"
+            " those of each with a gap, and of the airframe.",
         ),
     ] = None,
     terms: Annotated[
@@ -101,13 +108,15 @@ def diagnose(
     name = control_named(control, records[0]) if control else None
     if any(record.is_dir() for record in records):
         asked = {"--improve": improve, "--plots": plots, "--power": power, "--healthy": healthy}
-        asked["--terms"] = terms
+        asked |= {"--terms": terms, "--with-curves": with_curves}
         _refuse_for_folders(records, asked | {"--json": json_file, "--report": report})
         _diagnose_folder(records, rig, output, name, check_cluster(workers, cluster))
         return
     if workers is not None or cluster:
         option = "--cluster" if cluster else "--workers"
         raise InputError(records[0], option, "is for a folder of records")
+    if with_curves and improve is None:
+        raise InputError(records[0], "--with-curves", "is for --improve NEW.toml")
     if output is not None:
         raise InputError(output, "--output", "is for a folder of records; give --json FILE")
     rig_file = find(rig, shipped_rigs(), "rig") if rig else None
@@ -122,11 +131,12 @@ def diagnose(
     check_json(json_file, [*inputs, *targets])
     whole, read = _diagnose(records, rig_file, name, healthy or [], terms)
     note = say_guesses(whole.nominal, whole.controls)
-    worse = improve is not None and not whole.improves
+    improves = whole.improves_with_curves if with_curves else whole.improves
+    worse = improve is not None and not improves
     table = whole.as_dict(power) if json_file else {}
     with progress("drawing and writing"), Outputs() as outputs:
         if improve is not None and not worse:
-            _write_improved(outputs.at(improve), whole, rig_file, read)
+            _write_improved(outputs.at(improve), whole, rig_file, read, with_curves)
         if plots is not None:
             drawn = [plots / one for one in _draw(outputs.folder(plots), whole, note, units)]
         keep_json(table, json_file, outputs)
@@ -137,6 +147,8 @@ def diagnose(
         with out.widened(wide):
             _print(whole, power, (None if worse else improve, drawn), units)
         say_report(report)
+        if with_curves and not whole.curves:
+            say("no curve describes what the effects leave; --with-curves adds none")
         if worse:
             say(f"not written: {improve}. With it the flight stays further from the record")
     print_json(table, json_file)
@@ -166,7 +178,8 @@ def _diagnose(
     with progress() as advance:
         whole = find_gap(nominal, read, control, advance, well, terms=terms)
         advance("flying again, and looking for the next test", 0, 1)
-        _ = whole.closed_loop, whole.in_flight, whole.next_tests  # here, where progress is shown
+        # Computed here, where progress is shown.
+        _ = whole.closed_loop, whole.closed_loop_with_curves, whole.in_flight, whole.next_tests
     return whole, read
 
 
@@ -213,7 +226,11 @@ _BESIDE = {
 
 
 def _write_improved(
-    path: Path, whole: Diagnosis, rig_file: Path | None, records: dict[str, Record]
+    path: Path,
+    whole: Diagnosis,
+    rig_file: Path | None,
+    records: dict[str, Record],
+    with_curves: bool,
 ) -> None:
     from coupled.calibration.assumed import outdated_bends
     from coupled.files import read_text
@@ -231,15 +248,18 @@ def _write_improved(
         filed, held = read_rig(rig_file), shown(rig_file.name)
         text = read_text(rig_file, "a rig file is wanted")
     remark = f"{held} with what was found in {names}:\n{whole.summary}\n"
-    for effect in whole.effects:
+    improved = whole.with_curves if with_curves else whole.improved
+    curves = whole.curves if with_curves else ()
+    remark += "".join(f"added: {one.key}, {one.lists} over {one.of}; no cause\n" for one in curves)
+    for effect in whole.credible if curves else whole.effects:
         remark += "".join(f"changed: {effect.key_of(p)} {change(p)}\n" for p in effect.parameters)
     for setting in (one for one in whole.settings if one.moved):
         remark += f"changed: {setting.words}, within its tolerance\n"
-    remark += "".join(f"{sentence}\n" for sentence in outdated_bends(filed, whole.improved))
+    remark += "".join(f"{sentence}\n" for sentence in outdated_bends(filed, improved))
     # The trim was taken from the record, and is no change of the rig file; nor is the frame rate
     # of a rig without controls.
     judged = trimmed(filed, records)[0] if filed.controls else whole.nominal
-    changes = differences(judged, whole.improved)
+    changes = differences(judged, improved)
     said = remark
     for key in changes:
         dotted = ".".join(key)

@@ -19,6 +19,7 @@ from typing import TypeVar
 from coupled.gap.chain import Part
 from coupled.gap.findings.answer import effects_of, incredible, settings_of, verdict_of
 from coupled.gap.findings.budget import stage_budget
+from coupled.gap.findings.curves import find_curves
 from coupled.gap.findings.diagnosis import Diagnosis, PartDiagnosis
 from coupled.gap.findings.healthy import Baseline, beside_healthy
 from coupled.gap.findings.inseparable import inseparable
@@ -148,6 +149,9 @@ def findings(prepared: Prepared, case: Case, choice: Choice) -> PartDiagnosis:
     change = None if baseline is None else baseline.compared(records, outputs_now, part.own)
     verdict = verdict_of(choice, stages, effects, budget)
     verdict, stages = beside_healthy(verdict, stages, baseline, change)
+    curves = None
+    if part.own and verdict in ("mostly", "unexplained"):
+        curves = find_curves(case, choice, effects, [reader.record for reader in readers])
     filtered = (one.filtered().items() for one in readers) if part.own else ()
     return PartDiagnosis(
         part=part,
@@ -174,6 +178,7 @@ def findings(prepared: Prepared, case: Case, choice: Choice) -> PartDiagnosis:
         filtered={name: one for each in filtered for name, one in each},
         left_out=prepared.left_out,
         inseparable=inseparable(choice.fit),
+        curved=curves,
     )
 
 

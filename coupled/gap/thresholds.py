@@ -266,6 +266,16 @@ LAGS_s = (0.03, 0.1, 0.3, 1.0)  # chosen: of the copies of a signal
 RIDGES = tuple(10.0**k for k in range(-7, 3))  # chosen; held-out stretches decide among them
 FLAT = 1e-3  # chosen: share of its spread under which a part does not determine a function
 
+# Curves of what no effect explains (`curves`).
+CURVE_NODES = 18  # most nodes of a curve; a rig file takes 24, and differences add up to three
+CURVE_PLACES = 24  # chosen: even places of a node, and as many quantiles
+CURVE_KINKS = (0.1, 0.5, 2.0, 10.0, 50.0)  # chosen: kinks of the prior, of the values' size
+CURVE_STEP = 0.01  # chosen: of the size of the stage's signals, a step of a difference
+CURVE_ROUNDS = 4  # chosen: most fits about the last curve
+CURVE_NEAR = 0.3  # chosen: of the best gain after one fit, from which a law is fitted further
+CURVE_CLOSES = 0.5  # chosen: least share of the gap, surely closed on held-out stretches
+CURVE_DRIFT = 0.2  # chosen: of a curve's size, by which it surely differs from half to half
+
 # How far the gap shrinks (`shrink`).
 BOOTSTRAPS = 400  # chosen: draws of a bootstrap interval
 FEW_STRETCHES = 8  # under which a bootstrap interval is not to be relied on; chosen

@@ -1,4 +1,4 @@
-"""The figures of a diagnosis: the ladder, the chain of stages, the effect's signature."""
+"""The figures of a diagnosis: the ladder, the chain of stages, the effect's signature, curves."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 from coupled.display import System
 from coupled.gap.findings.diagnosis import Diagnosis, PartDiagnosis
 from coupled.plots.chain import draw_stages
+from coupled.plots.curves import draw_curves
 from coupled.plots.gapview import View
 from coupled.plots.ladder import draw_ladder
 from coupled.plots.signatures import draw_signature
@@ -18,14 +19,17 @@ FIGURES = {
     "stages.png": draw_stages,
     "signature.png": draw_signature,
 }
+CURVES = "curves.png"  # drawn only if there are any
 
 
 def drawn_parts(diagnosis: Diagnosis, system: System = "si") -> dict[str, dict[str, Figure]]:
     """Draw the parts with a gap, or all if none has one: figures by their names, by part."""
-    return {
-        part.control: {name: draw(View(part, system)) for name, draw in FIGURES.items()}
-        for part in shown_parts(diagnosis)
-    }
+
+    def drawn(part: PartDiagnosis) -> dict[str, Figure]:
+        figures = FIGURES | ({CURVES: draw_curves} if part.curves else {})
+        return {name: draw(View(part, system)) for name, draw in figures.items()}
+
+    return {part.control: drawn(part) for part in shown_parts(diagnosis)}
 
 
 def draw_diagnosis(diagnosis: Diagnosis, system: System = "si") -> dict[str, Figure]:
@@ -42,8 +46,8 @@ def draw_diagnosis(diagnosis: Diagnosis, system: System = "si") -> dict[str, Fig
 
 
 def figure_files(parts: Iterable[str]) -> list[str]:
-    """Return the names of the files of figures of parts, "" for the only one."""
-    return [file_of(name, part) for part in parts for name in FIGURES]
+    """Return the names of the files that figures of parts may have, "" for the only one."""
+    return [file_of(name, part) for part in parts for name in (*FIGURES, CURVES)]
 
 
 def file_of(name: str, part: str) -> str:

@@ -11,8 +11,9 @@ from coupled.plots.gaps import drawn_parts
 from coupled.plots.saving import svg_text
 from coupled.reports.page import Drawing, Made, Report, Section, Verdict
 from coupled.tables.gaps import (
-    closed_loop_table,
+    curve_table,
     effects_table,
+    flown_again_table,
     in_flight_table,
     keys_table,
     next_tests_table,
@@ -26,6 +27,7 @@ _TONES: dict[str, Tone] = {"no_gap": "good", "ambiguous": "bad", "unexplained": 
 _CAPTIONS = {
     "ladder.png": "What was tried, and how much each effect gains; how the gap falls with it.",
     "stages.png": "Each stage of the chain: its residual over what noise alone leaves.",
+    "curves.png": "Functions of one signal that describe what no effect explains; no causes.",
     "signature.png": "The law of what was found, as measured, as filed, and as found.",
 }
 
@@ -66,8 +68,10 @@ def _tables(
     yield "Stages of the chain", (stages_table(whole.stages),)
     if whole.effects:
         yield "How far the gap shrinks", (shrink_table(whole.shrink.channels, system),)
-    if whole.closed_loop is not None:
-        again = closed_loop_table(whole.closed_loop, system)
+    if whole.curves:
+        shrunk = shrink_table(whole.shrunk_by_curves, system, "with the curves")
+        yield "Curves", (*(curve_table(one, system) for one in whole.curves), shrunk)
+    if (again := flown_again_table(whole, system)) is not None:
         yield "Flown again with the record's pilot", (again,)
     if whole.in_flight is not None:
         yield "Change of the flight", (in_flight_table(whole.in_flight, system),)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
-from coupled.display import Shown, System, drawn, percent, split_unit
+from coupled.display import Shown, System, drawn, in_system, percent, split_unit
 from coupled.gap.findings.budget import StageBudget, share_of
 from coupled.gap.findings.result import EffectResult, ParameterEstimate, StageResult, labelled
 from coupled.gap.findings.summary import change, figure, in_units, labels, plain, size_in
@@ -13,6 +13,7 @@ from coupled.tables.table import NONE, Mark, Row, Table
 
 if TYPE_CHECKING:
     from coupled.gap.batch import Row as Diagnosed
+    from coupled.gap.findings.curves import Curve
     from coupled.gap.findings.diagnosis import Diagnosis
     from coupled.gap.findings.flown import ChannelAgain
     from coupled.gap.findings.inflight import EffectInFlight
@@ -27,8 +28,9 @@ def diagnosis_tables(whole: Diagnosis, power: bool, system: System = "si") -> It
     if whole.effects:
         yield effects_table(whole.effects, whole.budget, system)
     yield stages_table(whole.stages)
-    if whole.closed_loop is not None:
-        yield closed_loop_table(whole.closed_loop, system)
+    yield from (curve_table(one, system) for one in whole.curves)
+    if (flown := flown_again_table(whole, system)) is not None:
+        yield flown
     if whole.in_flight is not None:
         yield in_flight_table(whole.in_flight, system)
     if power:
@@ -91,9 +93,11 @@ def _stage(stage: StageResult) -> Row:
     return stage.name, f"{stage.gap:.2f}", left, remark
 
 
-def shrink_table(channels: Sequence[ChannelShrink], system: System = "si") -> Table:
+def shrink_table(
+    channels: Sequence[ChannelShrink], system: System = "si", by: str = "with the effects"
+) -> Table:
     """Return how far the RMS residual of each channel shrinks on held-out stretches."""
-    heads = ("channel", "rms as filed", "with the effects", "noise", "closed", "95 % interval")
+    heads = ("channel", "rms as filed", by, "noise", "closed", "95 % interval")
     caption = "The rms residual on stretches of the record that the fit has not seen"
     return Table(heads, tuple(_shrink(one, system) for one in channels), caption)
 
@@ -108,14 +112,43 @@ def _shrink(one: ChannelShrink, system: System) -> Row:
     return label, *numbers, percent(one.closed, 0), ends
 
 
-def closed_loop_table(channels: Sequence[ChannelAgain], system: System = "si") -> Table:
-    """Return the RMS distance from the record of flights with the record's pilot."""
+def curve_table(curve: Curve, system: System = "si") -> Table:
+    """Return the nodes and values of a curve, with their 95 % intervals."""
+    stem, of = split_unit(curve.of)
+    across, up = in_system(of, system), in_system(curve.unit, system)
     rows = []
-    for one in channels:
-        label, unit = _channel(one.channel, system)
-        rows.append((label, *(f"{unit.factor * n:.3g}" for n in (one.before, one.after))))
-    heads = ("flown again with the record's pilot, rms off by", "rig as filed", "improved")
-    return Table(heads, tuple(rows))
+    for node, *values in zip(curve.nodes, curve.values, curve.low, curve.high, strict=True):
+        value, low, high = (f"{up.factor * each:.4g}" for each in values)
+        rows.append((f"{across.factor * node:.4g}", value, f"{low} to {high}"))
+    heads = (f"{plain(stem)}, {across.unit}", f"{curve.key}, {up.unit}", "95 % interval")
+    caption = f"A curve of the {curve.stage}, no cause; it {curve.words}"
+    return Table(heads, tuple(rows), caption, align="r", spare=("95 % interval",))
+
+
+def flown_again_table(whole: Diagnosis, system: System = "si") -> Table | None:
+    """Return the flights with the record's pilot as a table; None if there are none."""
+    flown = [one for one in (whole.closed_loop, whole.closed_loop_with_curves) if one is not None]
+    if not flown:
+        return None
+    heads = [*(["improved"] if whole.closed_loop is not None else [])]
+    heads += ["with curves"] if whole.closed_loop_with_curves is not None else []
+    return closed_loop_table(flown, heads, system)
+
+
+def closed_loop_table(
+    flown: Sequence[Sequence[ChannelAgain]], heads: Sequence[str], system: System = "si"
+) -> Table:
+    """Return the RMS distance from the record of flights with the record's pilot.
+
+    `flown` are the channels of each rig, `heads` what the rigs are called.
+    """
+    rows = []
+    for each in zip(*flown, strict=True):
+        label, unit = _channel(each[0].channel, system)
+        numbers = (each[0].before, *(one.after for one in each))
+        rows.append((label, *(f"{unit.factor * n:.3g}" for n in numbers)))
+    first = "flown again with the record's pilot, rms off by"
+    return Table((first, "rig as filed", *heads), tuple(rows))
 
 
 def in_flight_table(effects: Sequence[EffectInFlight], system: System = "si") -> Table:

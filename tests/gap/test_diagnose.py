@@ -79,6 +79,7 @@ def test_a_single_effect_is_named_at_its_stage_and_size(
         assert measured == pytest.approx(value, rel=near), got
     assert found.shrink.closed is not None and found.shrink.closed > 0.95
     assert name.replace("_", " ") in found.summary.lower()
+    assert found.curves == ()
     json.dumps(found.as_dict(), allow_nan=False)
 
 
@@ -97,7 +98,7 @@ def test_two_effects_at_two_stages_are_both_named(tmp_path: Path) -> None:
 def test_without_an_effect_there_is_no_gap(tmp_path: Path, flown: bool, seed: int) -> None:
     found = diagnosed(tmp_path, flown, {}, seed)
     assert found.verdict == "no_gap"
-    assert found.effects == ()
+    assert (found.effects, found.curves) == ((), ())
     assert all(stage.gap < 1.15 for stage in found.stages if stage.gap is not None)
 
 
@@ -112,6 +113,7 @@ def test_an_effect_outside_the_library_is_unexplained_at_its_stage(tmp_path: Pat
     found = diagnose(nominal, {"r.csv": Record(record.channels, data)}, "column")
     assert found.verdict == "unexplained"
     assert found.guilty == ("linkage",)
+    assert found.curves == ()
 
 
 def test_a_stage_whose_channels_lack_is_not_judged(tmp_path: Path) -> None:

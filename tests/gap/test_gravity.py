@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import pytest
-from coupled.plots.signature import draw_signature
 
 from coupled.errors import InputError
 from coupled.gap.chain import Part
 from coupled.gap.diagnose import diagnose
 from coupled.gap.prepare import prepare
 from coupled.plots.gapview import View
+from coupled.plots.signatures import draw_signature
 from tests.support.pendulum import WEIGHT_N, ANGLE_rad, moved, moved_rig
 
 

@@ -61,7 +61,7 @@ def test_a_key_that_is_no_effect_is_explained(
     monkeypatch.setattr("coupled.gap.trimmed.trimmed", lambda rig, records: (rig, ""))
     target = tmp_path / "new.toml"
     records: dict[str, Record] = {}
-    _write_improved(target, cast("Diagnosis", whole), None, records)
+    _write_improved(target, cast("Diagnosis", whole), None, records, with_curves=False)
     head = [line for line in target.read_text(encoding="utf-8").splitlines() if line[:1] == "#"]
     assert (
         "# written beside these: controls.column.loader.servo_damping_ratio, since a file gives"

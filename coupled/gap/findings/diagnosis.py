@@ -12,6 +12,7 @@ from coupled.gap.chain import Part
 from coupled.gap.effects.effect import Effect, keys_of
 from coupled.gap.effects.library import EFFECTS
 from coupled.gap.findings.changed import Comparison
+from coupled.gap.findings.curves import Curve, Curves
 from coupled.gap.findings.flown import Again, ChannelAgain, closed_loop, nearer
 from coupled.gap.findings.healthy import Baseline
 from coupled.gap.findings.inflight import EffectInFlight, in_flight, in_words
@@ -19,12 +20,13 @@ from coupled.gap.findings.inseparable import Alike
 from coupled.gap.findings.power import EffectPower, power
 from coupled.gap.findings.proposal import ProposedTest, in_one_line, next_tests
 from coupled.gap.findings.result import FORMAT, EffectResult, Findings
-from coupled.gap.findings.shrink import Shrink
+from coupled.gap.findings.shrink import ChannelShrink, Shrink
 from coupled.gap.findings.summary import MISFIT, NOISE, filtered_words, summary
 from coupled.gap.search.case import Case
 from coupled.gap.search.found import Choice
 from coupled.gap.signals.output import Output
 from coupled.gap.signals.reading import worth_recording
+from coupled.gap.thresholds import CERTAIN
 from coupled.record.channels import ControlName
 from coupled.record.record import Record
 from coupled.results import TableResult, frame_of
@@ -58,6 +60,7 @@ class Diagnosis(Findings, TableResult):
     left_out: tuple[str, ...] = ()
     # Parameters of the effects found that the records determine only together.
     inseparable: tuple[Alike, ...] = ()
+    # The curves beside the effects that are credible; None if there are none.
     # What of the trim comes from the records or their manifests, in words; empty if nothing.
     trim: str = ""
 
@@ -99,6 +102,39 @@ class Diagnosis(Findings, TableResult):
     def control_of(self, effect: EffectResult) -> str | None:
         """Return the control of an effect; None for one of the airframe."""
         return effect.control
+
+    @property
+    def curves(self) -> tuple[Curve, ...]:
+        """Functions of one signal that describe what no effect explains; no causes."""
+        return tuple(one for curved in self._curved for one in curved.found)
+
+    @property
+    def shrunk_by_curves(self) -> tuple[ChannelShrink, ...]:
+        """RMS of each channel on held-out stretches with the curves; empty without curves."""
+        return tuple(one for curved in self._curved for one in curved.shrink)
+
+    @property
+    def _curved(self) -> list[Curves]:
+        return [part.curved for part in self.parts if part.curved is not None]
+
+    @property
+    def credible(self) -> tuple[EffectResult, ...]:
+        """The effects of the rig with the curves."""
+        return tuple(one for one in self.effects if one.probability >= CERTAIN)
+
+    @property
+    def with_curves(self) -> Rig:
+        """The rig with the credible effects and the curves; without curves, the improved rig."""
+        rigs = [p.improved if p.curved is None else p.curved.rig for p in self.parts]
+        return self.joined(rigs)
+
+    @cached_property
+    def closed_loop_with_curves(self) -> tuple[ChannelAgain, ...] | None:
+        """The same as `closed_loop`, of the rig with the curves; None if there are none."""
+        if not self._curved:
+            return None
+        given = (self.nominal, self.with_curves, self.controls)
+        return closed_loop(*given, self.first, self._again)
 
     @property
     def first(self) -> Record:
@@ -149,6 +185,13 @@ class Diagnosis(Findings, TableResult):
         return self.closed_loop is None or nearer(self.closed_loop)
 
     @property
+    def improves_with_curves(self) -> bool:
+        """Whether the rig with the curves flies no further from the record than the filed rig."""
+        if not self._curved:
+            return self.improves
+        return self.closed_loop_with_curves is None or nearer(self.closed_loop_with_curves)
+
+    @property
     def next_tests(self) -> tuple[ProposedTest, ...]:
         """The tests that would discriminate the first alternatives, best first; empty if none."""
         raise NotImplementedError
@@ -194,6 +237,9 @@ class Diagnosis(Findings, TableResult):
             "settings": {one.name: one.factor for one in self.settings if one.yields is None},
         }
         found |= {one.name: one.yields for one in self.settings if one.yields is not None}
+        if self._curved:
+            found["curves"] = [one.as_dict() for one in self.curves]
+            found["shrink"]["with_curves"] = [one.as_dict() for one in self.shrunk_by_curves]
         if self.inseparable:
             found["inseparable"] = [one.as_dict() for one in self.inseparable]
         if self.filtered:
@@ -206,6 +252,9 @@ class Diagnosis(Findings, TableResult):
             found["healthy"] = self.beside_healthy
         if self.closed_loop is not None:
             found["closed_loop"] = {again.channel: again.as_dict() for again in self.closed_loop}
+        if self.closed_loop_with_curves is not None:
+            flown = self.closed_loop_with_curves
+            found["closed_loop_with_curves"] = {one.channel: one.as_dict() for one in flown}
         if self.in_flight is not None:
             found["in_flight"] = [self.owned(one) for one in self.in_flight]
         if self.next_tests:
@@ -225,6 +274,7 @@ class PartDiagnosis(Diagnosis):
     choice: Choice = field(repr=False, compare=False)
     baseline: Baseline | None = field(default=None, repr=False, compare=False)
     change: Comparison | None = field(default=None, repr=False, compare=False)
+    curved: Curves | None = field(default=None, repr=False, compare=False)
 
     __repr__ = Diagnosis.__repr__
 
@@ -286,6 +336,7 @@ class PartDiagnosis(Diagnosis):
         floor = MISFIT if missed else NOISE
         said = summary(self, self.shrink, flight, filtered, next_test, floor)
         said += "".join(f" Not distinguished: {one.words}." for one in self.inseparable)
+        said += "".join(f" {one.sentence}" for one in self.curves)
         held = "" if self.baseline is None else self.baseline.words
         changed = "" if self.change is None else self.change.words
         return " ".join(words for words in (held, changed, said) if words)

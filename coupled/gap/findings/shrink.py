@@ -86,12 +86,14 @@ def shrink(case: Case, fitted: Fit, floors: Floors) -> Shrink:
 
     def held(output: Output) -> ChannelShrink:
         floor = max(output.floor, floors.get((output.record, output.channel), 0.0))
-        return _of(output, rig, found, floor / output.floor, bool(effects))
+        return channel_shrink(output, rig, found, floor / output.floor, bool(effects))
 
     return Shrink(held(widest), tuple(held(output) for output in pool))
 
 
-def _of(output: Output, rig: Rig, found: Rig, floor: float, improved: bool) -> ChannelShrink:
+def channel_shrink(
+    output: Output, rig: Rig, found: Rig, floor: float, improved: bool
+) -> ChannelShrink:
     """Return one channel's RMS residual before and after, and its floor, in its own unit.
 
     `floor` is that of the improved rig, relative to the output's own.

@@ -212,12 +212,13 @@ def response(
 
 
 def signals(
-    output: Output, left: Floats, record: Record, control: ControlName
+    output: Output, left: Floats, record: Record, control: ControlName, stage: str = ""
 ) -> dict[str, Floats]:
     """Return the signals compared with an output's residual, by name with unit, if recorded.
 
-    `left` is the residual in floors. If motion is imposed, the force is the output: its prediction
-    replaces the measurement, which contains the residual that is to be explained.
+    They are those of the output's stage, or of another `stage`. `left` is the residual in floors.
+    If motion is imposed, the force is the output: its prediction replaces the measurement, which
+    contains the residual that is to be explained.
     """
     d, rate_Hz = unit_of(control), output.frame_rate_Hz
     names = {
@@ -228,7 +229,7 @@ def signals(
         "surface": (("estimate", d),),
     }
     found: dict[str, Floats] = {}
-    for quantity, unit in names.get(output.stage, ()):
+    for quantity, unit in names.get(stage or output.stage, ()):
         name = channel(control, quantity)
         if name not in record and quantity == "computed":
             name = channel(control, "deflection")  # the motion that was imposed

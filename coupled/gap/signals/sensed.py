@@ -15,10 +15,14 @@ import numpy as np
 from coupled.gap.noise.lines import projected
 from coupled.gap.signals.output import Floats
 from coupled.record.channels import ControlName
+from coupled.rig.curves import Curve
 from coupled.rig.nodes import on_nodes
 from coupled.rig.parameters import Sensing
 from coupled.rig.recorder import stamped
 from coupled.rig.rig import Rig
+
+FAR = 10.0  # of a curve's length, up to which it is inverted beyond its ends
+FLAT_SLOPE = 1e-6  # of a map where it is flat, to be inverted
 
 
 @dataclass(frozen=True)
@@ -85,14 +89,37 @@ class Sensed:
         `read` is δc as recorded, which gives the phase of the hum.
         """
         still = computed - self.hum_on_nodes(read)
-        return still / self.scale_on_nodes(len(computed)), self.force(recorded)
+        true = self.before_curve(still / self.scale_on_nodes(len(computed)))
+        return true, self.force(recorded)
 
     def as_the_host_had_it(self, recorded: Floats) -> Floats:
         """Return F as the host read it, N: without the delay of the recorder's time stamps."""
         return stamped(recorded, -self._of.force_stamp * self.rig.frame_rate)
 
+    def along_curve(self, computed: Floats) -> Floats:
+        """Return δc by the transducer's curve, before its scale, d."""
+        curve = self._of.deflection_curve
+        return curve.at(computed) if curve.nodes else computed
+
+    def before_curve(self, read: Floats) -> Floats:
+        """Return δc whose value by the transducer's curve is given, d."""
+        return _inverse(self._of.deflection_curve, read)
+
     def _unread(self, read: Floats) -> Floats:
         of = self._of
-        if of.force_scale == 1.0 and of.force_zero == 0.0:
-            return read
-        return (read - of.force_zero) / of.force_scale
+        if of.force_scale != 1.0 or of.force_zero != 0.0:
+            read = (read - of.force_zero) / of.force_scale
+        return _inverse(of.force_curve, read)
+
+
+def _inverse(curve: Curve, values: Floats) -> Floats:
+    """Return the signals at which a map has given values; where it is flat, one of them."""
+    if not curve.nodes:
+        return values
+    nodes = np.array(curve.nodes)
+    far = nodes[-1] + FAR * max(float(nodes[-1] - nodes[0]), float(np.ptp(values)))
+    least = -far if curve.odd else 2.0 * nodes[0] - far
+    at = np.concatenate(([least], -nodes[::-1] if curve.odd else [], nodes, [far]))
+    at = np.unique(at)
+    found = curve.at(at)
+    return np.asarray(np.interp(values, found + FLAT_SLOPE * at, at))

@@ -50,7 +50,7 @@ class Imposed:
                 grip, bending = moved - read_as.zero, read_as.force(pulled)
                 return behind_linkage(rig, reading.control, grip, bending, self._others)
             nodes = imposed.of(rig)
-            return np.asarray(nodes / read_as.scale_on_nodes(len(nodes)))
+            return read_as.before_curve(np.asarray(nodes / read_as.scale_on_nodes(len(nodes))))
 
         def predicted(rig: Rig) -> Floats:
             data, true = rig.controls[reading.control], at_loader(rig)
@@ -58,6 +58,8 @@ class Imposed:
             late_s = data.sensing.force_stamp - data.loader.delay
 
             def read(force: Floats) -> Floats:
+                curve = data.sensing.force_curve
+                force = curve.at(force) if curve.nodes else force
                 gauged = data.sensing.force_scale * force + data.sensing.force_zero
                 return stamped(gauged, late_s * rig.frame_rate)
 

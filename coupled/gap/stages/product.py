@@ -75,7 +75,8 @@ class Product:
             read = self._computed
         else:
             sensed, smooth = of.sensed(rig), self._likely if seen is None else seen
-            read = (smooth - sensed.hum(self._computed)) / sensed.scale(len(smooth))
+            still = smooth - sensed.hum(self._computed)
+            read = sensed.before_curve(still / sensed.scale(len(smooth)))
         return np.where(self.unsure, self.recorded, self._made(read, rig))
 
     def noisy(self, rig: Rig, k: int) -> Floats:

@@ -225,7 +225,8 @@ class Reader(Reading):
                 still = rate
                 if rate is not seen and isinstance(hum, np.ndarray):
                     still = rate - rate_of(hum, self.rig.frame_rate)
-                restart = (starts, (seen - hum) / scale, still / scale)
+                place = sensed.before_curve((seen - hum) / scale)
+                restart = (starts, place, still / scale)
                 pull = sensed.force_on_nodes(nodes.of(rig), f)
                 if times:
                     pull = pull + times * trembling.of(rig)
@@ -234,7 +235,8 @@ class Reader(Reading):
                 host = hosted.a_frame_late() if otherwise else hosted
                 host = host._replace(missed=self.missed.under(rig, self.control))
                 driven_by = (pull, gradient, misread + hum, load_of(rig), second, restart, host)
-                return scale * drive_loader(rig, self.control, *driven_by)[0] + hum
+                moved = drive_loader(rig, self.control, *driven_by)[0]
+                return scale * sensed.along_curve(moved) + hum
 
             return at
 

@@ -1,0 +1,295 @@
+"""Piecewise linear functions with smoothness and nodes by the evidence, and closed forms.
+
+    residual = J·θ + noise,   θ_i ~ N(0, S²),   kink_i ~ N(0, κ²·h_i)
+
+J holds the responses to a unit of the value at each of many possible nodes. kink_i is the change of
+slope at node i, h_i the mean width beside it. The log evidence of a linear model is a closed form
+(MacKay, Neural Computation 4, 1992): its terms are those of `search.evidence`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupled.gap.findings.curvelaws import Law
+from coupled.gap.search.evidence import misfit
+from coupled.gap.signals.output import Output, Part, memory
+from coupled.gap.thresholds import (
+    CURVE_KINKS,
+    CURVE_NODES,
+    PRIOR_EFFECT,
+    PRIOR_NUMBER,
+    PRIOR_SPAN,
+    RIVAL_GAIN,
+    UNDERSTATED,
+)
+
+Floats = NDArray[np.float64]
+WIDTH = PRIOR_SPAN / math.sqrt(2.0 * math.pi)  # prior's width over the size (`search.evidence`)
+Values = tuple[Floats, Floats]  # nodes and values of a curve
+
+
+@dataclass(frozen=True)
+class Sums:
+    """The normal equations of each output, and the weights of its frames.
+
+    `inner` is JᵀJ, shape (outputs, places, places), `along` Jᵀ·residual, `power` the residual's sum
+    of squares, `frames` their number, `samples` the effective number, `variance` that of the
+    residual in floors². `weights` are those of a frame in the likelihood.
+    """
+
+    inner: Floats
+    along: Floats
+    power: Floats
+    frames: Floats
+    samples: Floats
+    variance: Floats
+    weights: Floats
+
+    def of(self, mix: Floats) -> Sums:
+        """Return the sums for combinations of the columns, shape (places, combinations)."""
+        inner = np.einsum("pi,opq,qj->oij", mix, self.inner, mix)
+        return replace(self, inner=inner, along=self.along @ mix)
+
+    def likelihood(self, theta: Floats) -> float:
+        """Return the log likelihood of values."""
+        curved = np.einsum("i,oij,j->o", theta, self.inner, theta)
+        left = np.maximum(self.power - 2.0 * self.along @ theta + curved, 0.0)
+        square = left / (self.frames * self.variance)
+        return -0.5 * float(self.samples @ misfit(square))
+
+    def posterior(self, prior: Floats) -> Posterior:
+        """Return values, their covariance, and the log evidence for a prior's precision."""
+        precision = np.einsum("o,oij->ij", self.weights, self.inner) + prior
+        theta = np.linalg.solve(precision, self.weights @ self.along)
+        volume = np.linalg.slogdet(precision)[1] - np.linalg.slogdet(prior)[1]
+        rest = -0.5 * float(theta @ prior @ theta) - 0.5 * float(volume) - PRIOR_EFFECT
+        rest -= PRIOR_NUMBER * (len(theta) - 1)
+        return Posterior(theta, np.linalg.inv(precision), rest, self.likelihood(theta))
+
+    def size(self) -> float:
+        """Return the rms of the values of a fit without a prior to speak of."""
+        inner = np.einsum("o,oij->ij", self.weights, self.inner)
+        ridge = 1e-6 * np.trace(inner) / len(inner)
+        found = np.linalg.solve(inner + ridge * np.eye(len(inner)), self.weights @ self.along)
+        return float(np.sqrt(np.mean(found**2)))
+
+
+@dataclass(frozen=True)
+class Posterior:
+    """Values with their covariance; the log evidence is `likelihood` + `rest`."""
+
+    theta: Floats
+    covariance: Floats
+    rest: float
+    likelihood: float
+
+    @property
+    def log(self) -> float:
+        """The log evidence."""
+        return self.likelihood + self.rest
+
+
+@dataclass(frozen=True)
+class Basis:
+    """The responses to a unit of a law's value at each place, about a fitted curve.
+
+    `columns` are those of each output, shape (frames, places), `wanted` its residual without the
+    curve, linearised.
+    """
+
+    law: Law
+    places: Floats
+    outputs: Sequence[Output]
+    columns: Sequence[Floats]
+    wanted: Sequence[Floats]
+    variance: Floats
+
+    @property
+    def free(self) -> NDArray[np.bool_]:
+        """The places whose value is free: all but 0 of an anchored law."""
+        return np.asarray(~(self.law.anchored & (self.places == 0.0)))
+
+    @cached_property
+    def _scales(self) -> tuple[Floats, Floats]:
+        """Autocorrelation time and q of each output's residual with a value at every place."""
+        powers = [float(w @ w) for w in self.wanted]
+        inner = sum(j.T @ j / v for j, v in zip(self.columns, self.variance, strict=True))
+        along = sum(
+            j.T @ w / v for j, w, v in zip(self.columns, self.wanted, self.variance, strict=True)
+        )
+        assert isinstance(inner, np.ndarray) and powers
+        ridge = 1e-6 * np.trace(inner) / len(inner)
+        theta = np.linalg.solve(inner + ridge * np.eye(len(inner)), along)
+        lefts = [w - j @ theta for j, w in zip(self.columns, self.wanted, strict=True)]
+        squares = np.array([float(np.mean(left**2)) for left in lefts]) / self.variance
+        return np.array([memory(left) for left in lefts]), squares
+
+    def sums(self, part: Part) -> Sums:
+        """Return the normal equations of a part's frames."""
+        memories, squares = self._scales
+        rows = [output.rows(part) for output in self.outputs]
+        some = [(j[at], w[at]) for j, w, at in zip(self.columns, self.wanted, rows, strict=True)]
+        frames = np.array([float(at.sum()) for at in rows])
+        return Sums(
+            np.array([j.T @ j for j, _ in some]),
+            np.array([j.T @ w for j, w in some]),
+            np.array([float(w @ w) for _, w in some]),
+            frames,
+            frames / memories,
+            self.variance,
+            1.0 / (memories * np.maximum(squares, 1.0) * self.variance),
+        )
+
+
+@dataclass(frozen=True)
+class Pick:
+    """A curve with nodes at some places: their indices, and the values' posterior."""
+
+    at: tuple[int, ...]
+    known: Posterior
+
+    def values(self, basis: Basis) -> Values:
+        """Return nodes and values; 0 at 0 of an anchored law."""
+        nodes, free = basis.places[list(self.at)], basis.free[list(self.at)]
+        values = np.zeros(len(nodes))
+        values[free] = self.known.theta
+        return nodes, values
+
+    def errors(self, basis: Basis) -> Floats:
+        """Return half of the 95 % interval of each value."""
+        found = np.zeros(len(self.at))
+        half = 1.96 * UNDERSTATED * np.sqrt(np.diag(self.known.covariance))
+        found[basis.free[list(self.at)]] = half
+        return found
+
+
+def _mix(basis: Basis, at: Sequence[int]) -> Floats:
+    """Return the values at all places by those at some, shape (places, free of these)."""
+    nodes = basis.places[list(at)]
+    unit = np.eye(len(at))[:, basis.free[list(at)]]
+    return np.array([np.interp(basis.places, nodes, column) for column in unit.T]).T
+
+
+def _smooth(basis: Basis, at: Sequence[int]) -> Floats:
+    """Return the precision of the kinks of values at some places, for κ = 1."""
+    nodes = basis.places[list(at)]
+    widths = np.diff(nodes) / (basis.places[-1] - basis.places[0])
+    kinks = np.zeros((max(len(at) - 2, 0), len(at)))
+    for k, (a, b) in enumerate(pairwise(widths.tolist())):
+        kinks[k, k : k + 3] = np.array([1.0 / a, -1.0 / a - 1.0 / b, 1.0 / b])
+        kinks[k] /= math.sqrt(0.5 * (a + b))
+    kinks = kinks[:, basis.free[list(at)]]
+    return np.asarray(kinks.T @ kinks)
+
+
+def with_nodes(basis: Basis, sums: Sums, at: Sequence[int]) -> Pick:
+    """Return the curve with nodes at given places, and the smoothness of the largest evidence."""
+    own, rough = sums.of(_mix(basis, at)), _smooth(basis, at)
+    size = max(own.size(), 1e-300)
+    level = np.eye(len(rough)) / (WIDTH * size) ** 2
+    each = [own.posterior(level + rough / (kink * size) ** 2) for kink in CURVE_KINKS]
+    return Pick(tuple(at), max(each, key=lambda one: one.log))
+
+
+def choose(basis: Basis, sums: Sums, entries: Sequence[float]) -> tuple[Pick, Pick]:
+    """Return the curve with the nodes of the largest evidence, and the straight line.
+
+    The search begins at the ends, and again at the entries of the schedule.
+    """
+    ends = {0, len(basis.places) - 1, *np.flatnonzero(basis.places == 0.0).tolist()}
+    line = with_nodes(basis, sums, sorted(ends))
+    own = ends | {*np.flatnonzero(np.isin(basis.places, entries)).tolist()}
+    starts = [line]
+    if len(ends) < len(own) < CURVE_NODES:
+        starts.append(with_nodes(basis, sums, sorted(own)))
+    grown = [_grown(basis, sums, start, ends) for start in starts]
+    return max(grown, key=lambda one: one.known.log), line
+
+
+def _grown(basis: Basis, sums: Sums, start: Pick, ends: set[int]) -> Pick:
+    """Return a curve with nodes added one by one, and then taken away, as the evidence grows.
+
+    Two nodes that gain only together are found: one may lose evidence if the next gains more.
+    """
+    best = last = start
+    while len(last.at) < CURVE_NODES and len(last.at) <= len(best.at) + 1:
+        more = [k for k in range(len(basis.places)) if k not in last.at]
+        if not more:
+            break
+        tries = (with_nodes(basis, sums, sorted((*last.at, k))) for k in more)
+        last = max(tries, key=lambda one: one.known.log)
+        best = max(best, last, key=lambda one: one.known.log)
+    while inner := [k for k in best.at if k not in ends]:
+        fewer = [with_nodes(basis, sums, [j for j in best.at if j != k]) for k in inner]
+        less = max(fewer, key=lambda one: one.known.log)
+        if less.known.log < best.known.log:
+            break
+        best = less
+    return best
+
+
+Form = tuple[str, Floats]
+
+
+def closed_form(basis: Basis, curve: Pick, entries: Sequence[float]) -> str:
+    """Return the closed form with the largest evidence, if that is as large as the curve's.
+
+    Beside it, a straight line is free: its slope and its level are effects of the library.
+    """
+    sums, places = basis.sums("all"), basis.places
+    lines = [np.empty((len(places), 0)), places[:, None]]
+    if not basis.law.anchored:
+        lines += [np.ones((len(places), 1)), np.column_stack((places, np.ones(len(places))))]
+    best, name = curve.known.log - RIVAL_GAIN, ""
+    for text, form in _forms(basis.law, places, entries):
+        for line in lines:
+            log = _log_of(sums.of(np.column_stack((form, line))))
+            if log > best:
+                best, name = log, text
+    return name
+
+
+def _log_of(sums: Sums) -> float:
+    """Return the log evidence of a few independent sizes, each with a prior of its own width."""
+    inner = np.einsum("o,oij->ij", sums.weights, sums.inner)
+    if not np.all(np.diag(inner) > 0.0):
+        return -math.inf
+    scale = 1.0 / np.sqrt(np.diag(inner))
+    theta = (
+        scale
+        * np.linalg.lstsq(
+            inner * np.outer(scale, scale), scale * (sums.weights @ sums.along), rcond=None
+        )[0]
+    )
+    width = WIDTH * np.maximum(np.abs(theta), scale)
+    return sums.posterior(np.diag(1.0 / width**2)).log
+
+
+def _forms(law: Law, x: Floats, entries: Sequence[float]) -> Iterator[Form]:
+    """Yield the closed forms of a law, and their values at places, shape (places, 1)."""
+    s, size = law.symbol, np.abs(x)
+    if law.stage == "schedule":
+        inside = [e for e in entries if x[0] <= e <= x[-1]]
+        for k, at in enumerate(entries):
+            if at in inside:
+                unit = np.eye(len(entries))[k]
+                yield f"one entry, at {at:g} Pa", np.interp(x, entries, unit)
+        yield f"c·{s}²", x**2
+        return
+    yield f"c·{s}·|{s}|", x * size
+    yield f"c·{s}³", x**3
+    if not law.by_size:
+        yield f"c·{s}²", x**2
+        yield f"c·|{s}|", size
+    for at in size[size > 0.0]:
+        yield f"c·sgn({s}) beyond |{s}| = {at:.3g}", np.sign(x) * (size >= at)
+        zone = "dead zone" if law.stage in ("sensing", "surface") else "saturation"
+        yield f"{zone} at |{s}| = {at:.3g}", np.clip(x, -at, at)

@@ -1,0 +1,168 @@
+"""Curves: laws of one signal that the library lacks are described, and nothing else is."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from coupled.blind.twin.twin import Twin
+from coupled.gap.chain import Part
+from coupled.gap.diagnose import findings
+from coupled.gap.findings.diagnosis import PartDiagnosis
+from coupled.gap.prepare import prepare
+from coupled.gap.search.beam import search_sets
+from coupled.gap.signals.sensed import Sensed
+from coupled.plots.curves import draw_curves
+from coupled.plots.gapview import View
+from coupled.record.record import write_record
+from coupled.rig.rigfile import read_rig
+from coupled.tables.gaps import curve_table
+from tests.support.commands import coupled
+from tests.support.outside import RIG, Fault, curves_of, recorded
+
+COLUMN = RIG.controls["column"]
+TABLE = COLUMN.schedule
+QUADRATIC = 150.0  # N·s²/m²
+ENTRY, WRONG = 2, 1.1  # an entry of the schedule, and the factor by which it is off
+
+
+def by_the_square(twin: Twin, time_s: float, pressure_Pa: float) -> None:
+    twin.set(quadratic_damping=QUADRATIC)
+
+
+def wrong_entry(twin: Twin, time_s: float, pressure_Pa: float) -> None:
+    twin.numbers[0]["first"][ENTRY] = WRONG * TABLE.total_gradient[ENTRY]
+
+
+def fades(twin: Twin, time_s: float, pressure_Pa: float) -> None:
+    twin.set(damping=COLUMN.loader.damping * (1.0 + 1.5 * np.exp(-time_s / 7.0)))
+
+
+def jams(twin: Twin, time_s: float, pressure_Pa: float) -> None:
+    twin.set(damping=3000.0 if time_s % 7.0 > 6.0 else COLUMN.loader.damping)
+
+
+def drifts(twin: Twin, time_s: float, pressure_Pa: float) -> None:
+    twin.set(basic_gradient=COLUMN.loader.basic_gradient * (1.0 + 0.008 * time_s))
+
+
+def of_two_signals(twin: Twin, time_s: float, pressure_Pa: float) -> None:
+    """A force in proportion to the deflection times q̄."""
+    twin.set(basic_gradient=COLUMN.loader.basic_gradient + 0.1 * pressure_Pa)
+
+
+def healthy(twin: Twin, time_s: float, pressure_Pa: float) -> None:
+    """Leave the twin as its rig is."""
+
+
+def test_damping_by_the_square_of_the_speed_is_a_curve_over_the_rate() -> None:
+    found = curves_of(recorded(by_the_square))
+    assert found is not None
+    (curve,) = found.found
+    assert (curve.stage, curve.of, curve.unit) == ("loader", "rate_m_per_s", "N")
+    assert curve.like == "c·v·|v|"
+    assert curve.closed > 0.9
+    rate = np.array(curve.nodes)
+    # A straight line between two nodes is off by an eighth of c·h² at its middle, at most.
+    between = QUADRATIC * np.max(np.diff(rate)) ** 2 / 8.0
+    own = found.rig.controls["column"].loader.damping - COLUMN.loader.damping  # in its tolerance
+    whole = np.array(curve.values) + own * rate
+    assert whole == pytest.approx(QUADRATIC * rate**2, abs=between, rel=0.1)
+    assert np.all(np.array(curve.low) <= curve.values)
+    assert np.all(np.array(curve.high) >= curve.values)
+
+
+@pytest.fixture(scope="module")
+def entry() -> PartDiagnosis:
+    """A diagnosis of the wrong entry, as if the library were empty."""
+    prepared = prepare(RIG, {"r.csv": recorded(wrong_entry)}, Part("column"))
+    return findings(prepared, *search_sets(prepared.case, []))
+
+
+def test_a_wrong_entry_of_the_schedule_is_that_entry(entry: PartDiagnosis) -> None:
+    (curve,) = entry.curves
+    at = TABLE.dynamic_pressure[ENTRY]
+    assert (curve.stage, curve.of) == ("schedule", "dynamic_pressure_Pa")
+    assert curve.like == f"one entry, at {at:g} Pa"
+    off = float(np.interp(at, curve.nodes, curve.values))
+    assert off == pytest.approx((WRONG - 1.0) * TABLE.total_gradient[ENTRY], rel=0.02)
+    assert curve.closed > 0.9
+
+
+@pytest.mark.parametrize(
+    "fault",
+    [
+        healthy,
+        pytest.param(fades, marks=pytest.mark.slow),
+        pytest.param(jams, marks=pytest.mark.slow),
+        pytest.param(drifts, marks=pytest.mark.slow),
+        pytest.param(of_two_signals, marks=pytest.mark.slow),
+    ],
+)
+def test_what_is_no_function_of_one_signal_is_no_curve(fault: Fault) -> None:
+    assert curves_of(recorded(fault)) is None
+
+
+def test_a_curve_is_reported_and_drawn_and_no_cause(entry: PartDiagnosis) -> None:
+    assert entry.verdict == "unexplained"
+    assert entry.effects == ()
+    stated = [one.as_dict() for one in entry.curves]
+    (written,) = json.loads(json.dumps(stated, allow_nan=False))
+    assert {"of", "unit", "nodes", "values", "low", "high", "closed", "like"} <= set(written)
+    assert len({len(written[name]) for name in ("nodes", "values", "low", "high")}) == 1
+    assert entry.curved is not None
+    assert entry.curved.shrink[0].channel == "column_gradient_N_per_m"
+    assert entry.curved.shrink[0].closed == pytest.approx(written["closed"])
+    assert entry.curves[0].sentence.endswith("it is no cause.")
+    table = curve_table(entry.curves[0], "us")
+    assert table.caption.startswith("A curve of the schedule, no cause; it closes ")
+    assert table.heads[1] == "controls.column.schedule.gradient_curve, lb/in"
+    assert len(draw_curves(View(entry)).axes) == 1
+
+
+@pytest.mark.parametrize("first", [0.0, -0.02])
+def test_a_reading_is_inverted_along_its_curve(first: float) -> None:
+    nodes = [first, 0.01, 0.03]
+    reading = [1.3 * nodes[0], 0.013, 0.025]
+    key = "controls.column.sensing.deflection_curve"
+    curved = RIG.changed({key: {"deflection_m": nodes, "reading_m": reading}})
+    sensed = Sensed(curved, "column")
+    true = np.linspace(-0.04, 0.04, 41)
+    assert not np.allclose(sensed.along_curve(true), true)
+    assert sensed.before_curve(sensed.along_curve(true)) == pytest.approx(true, abs=1e-7)
+
+
+def test_curves_are_written_to_an_improved_rig_only(tmp_path: Path) -> None:
+    done = coupled(tmp_path, "diagnose", "r.csv", "--rig", "bench", "--with-curves")
+    assert done.returncode == 2
+    assert done.stderr == "error: r.csv: --with-curves: is for --improve NEW.toml\n"
+
+
+@pytest.mark.slow
+def test_the_rig_with_curves_is_written_and_explains_the_record(tmp_path: Path) -> None:
+    write_record(recorded(wrong_entry), tmp_path / "r.csv")
+    RIG.save(tmp_path / "rig.toml")
+    words = ("diagnose", "r.csv", "--rig", "rig.toml", "--with-curves")
+    more = ("--improve", "new.toml", "--json", "d.json", "--plots", "figures")
+    done = coupled(tmp_path, *words, *more)
+    assert done.returncode == 0, done.stderr
+    text = (tmp_path / "new.toml").read_text(encoding="utf-8")
+    assert "# added: controls.column.schedule.gradient_curve" in text
+    curve = read_rig(tmp_path / "new.toml").controls["column"].schedule.gradient_curve
+    assert len(curve.nodes) > 2
+    assert "with curves" in done.stdout
+    found = json.loads((tmp_path / "d.json").read_text())
+    assert found["verdict"] == "unexplained"
+    assert found["curves"][0]["stage"] == "schedule"
+    assert found["shrink"]["with_curves"][0]["closed"] > 0.9
+    flown = found["closed_loop_with_curves"]["column_computed_m"]
+    assert flown["after"] < 0.5 * flown["before"]
+    assert (tmp_path / "figures" / "curves.png").is_file()
+    without = coupled(tmp_path, *words[:-1], "--improve", "plain.toml")
+    assert without.returncode == 0
+    assert not read_rig(tmp_path / "plain.toml").controls["column"].schedule.gradient_curve.nodes
+    again = coupled(tmp_path, "diagnose", "r.csv", "--rig", "./new.toml")
+    assert "No gap" in again.stdout
