@@ -13,7 +13,7 @@ class Rows(NamedTuple):
     """The numbers of one row or of many, one after the other, and each channel's place in a row."""
 
     places: Mapping[str, int]
-    numbers: memoryview
+    numbers: memoryview[float]
 
 
 class State:
@@ -94,9 +94,9 @@ class State:
 
     def as_list(self) -> list[float]:
         """Return the values in the channels' order, SI."""
-        return self._own().tolist()
+        return list(self._own())
 
-    def _own(self) -> memoryview:
+    def _own(self) -> memoryview[float]:
         """Return this row's numbers."""
         return self._rows.numbers[self._start : self._start + len(self)]
 

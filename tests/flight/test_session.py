@@ -254,7 +254,7 @@ def test_many_resets_leak_nothing(rig: str, resets: int) -> None:
 
 def test_a_state_keeps_its_values_whatever_the_flight_does(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("coupled.api.sessions._FIRST_s", 0.1)  # the arrays are replaced soon
-    with coupled.Session("t37") as session:
+    with coupled.Session(COLUMN) as session:
         for force in wandering(1, 9):
             state = session.step(column_force_N=force)
         values, copied = state.as_dict(), pickle.loads(pickle.dumps(state))
