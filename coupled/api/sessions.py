@@ -18,7 +18,7 @@ from coupled.flight.pilot import Pilot
 from coupled.flight.pilot.base import STRONGEST
 from coupled.flight.pilot.own import GivenForce, Law, OwnPilot
 from coupled.flight.started import StartedFlight
-from coupled.flight.state import State, state_reader
+from coupled.flight.state import State, copy_row, state_reader
 from coupled.record.channels import CONTROL_NAMES, ControlName, channel
 from coupled.record.record import EndedEarly, Record
 from coupled.rig.rig import Rig
@@ -266,7 +266,8 @@ class Session:
 
         `seed` is that of the next flight's noise, turbulence and gusts; without it, the session's.
         The aircraft of a 737, B747, T-37 or F-16 is reset, if nothing but its commands acts on it.
-        JSBSim does not restore others exactly; they are loaded anew.
+        Others are loaded anew, without a leak: JSBSim's reset does not restore the hysteresis of a
+        stall, as of a c172p, or the position of an actuator, as of an awjsra.
         """
         self._check_open("reset")
         self._start(self._begun if seed is None else replace(self._begun, seed=seed))
@@ -314,6 +315,7 @@ class Session:
 
     def _change(self, change: Callable[[], None]) -> None:
         """Make a change of the controls at this frame, and take the state with it."""
+        copy_row(self._state)
         self._again(self._k, change)
         self._look()
 

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from array import array
 from collections.abc import Callable, Iterator, Mapping
-from struct import Struct
-from typing import Any, NoReturn
+from typing import Any, NamedTuple, NoReturn
 
 from coupled.errors import MissingKeyError, nearest, shown
 from coupled.record.channels import TIME
 
-_NUMBER_bytes = 8
-_number = Struct("d").unpack_from
+
+class Rows(NamedTuple):
+    """The numbers of one row or of many, one after the other, and each channel's place in a row."""
+
+    places: Mapping[str, int]
+    numbers: memoryview[float]
 
 
 class State:
@@ -29,36 +31,40 @@ class State:
     (1500, 0.0, 46)
     """
 
-    __slots__ = ("_places", "_values")
-    _places: Mapping[str, int]
-    _values: bytes
+    __slots__ = ("_rows", "_start")
+    _rows: Rows
+    _start: int
 
     def __init__(self, places: Mapping[str, int], values: bytes) -> None:
-        _set_places(self, places)
-        _set_values(self, values)
+        _set_rows(self, Rows(places, memoryview(values).cast("d")))
+        _set_start(self, 0)
 
     def __getattr__(self, name: str) -> float:
-        at = self._places.get(name)
+        places, numbers = self._rows
+        at = places.get(name)
         if at is None:
-            hint = nearest(name, self._places)
+            hint = nearest(name, places)
             raise AttributeError(f"a state has no {shown(name)}; {hint}", name=name, obj=self)
-        return float(_number(self._values, _NUMBER_bytes * at)[0])
+        found: float = numbers[self._start + at]
+        return found
 
     def __getitem__(self, channel: str) -> float:
-        at = self._places.get(channel) if isinstance(channel, str) else None
+        places, numbers = self._rows
+        at = places.get(channel) if isinstance(channel, str) else None
         if at is None:
-            hint = nearest(str(channel), self._places)
+            hint = nearest(str(channel), places)
             raise MissingKeyError("state", "", f"no channel {shown(str(channel))}; {hint}")
-        return float(_number(self._values, _NUMBER_bytes * at)[0])
+        found: float = numbers[self._start + at]
+        return found
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self._places)
+        return iter(self._rows.places)
 
     def __len__(self) -> int:
-        return len(self._places)
+        return len(self._rows.places)
 
     def __contains__(self, channel: object) -> bool:
-        return channel in self._places
+        return channel in self._rows.places
 
     def __setattr__(self, name: str, value: object) -> NoReturn:
         raise AttributeError(f"a state is frozen; {shown(name)} cannot be set")
@@ -70,47 +76,59 @@ class State:
         return isinstance(other, State) and self.as_dict() == other.as_dict()
 
     def __hash__(self) -> int:
-        return hash(self._values)
+        return hash(self._own().tobytes())
 
     def __dir__(self) -> list[str]:
-        return sorted({*object.__dir__(self), *self._places})
+        return sorted({*object.__dir__(self), *self._rows.places})
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return State, (dict(self._places), self._values)
+        return State, (dict(self._rows.places), self._own().tobytes())
 
     def __repr__(self) -> str:
-        first = ", ".join(f"{name}={self[name]:.6g}" for name in list(self._places)[:3])
+        first = ", ".join(f"{name}={self[name]:.6g}" for name in list(self)[:3])
         return f"State({first}, …; {len(self)} channels)"
 
     def as_dict(self) -> dict[str, float]:
         """Return the values by channel, SI."""
-        return dict(zip(self._places, self.as_list(), strict=True))
+        return dict(zip(self, self.as_list(), strict=True))
 
     def as_list(self) -> list[float]:
         """Return the values in the channels' order, SI."""
-        return array("d", self._values).tolist()
+        return list(self._own())
+
+    def _own(self) -> memoryview[float]:
+        """Return this row's numbers."""
+        return self._rows.numbers[self._start : self._start + len(self)]
 
 
 # The slots' own setters, since a state is made in every frame and has no other.
-_set_places: Any = vars(State)["_places"].__set__
-_set_values: Any = vars(State)["_values"].__set__
+_set_rows: Any = vars(State)["_rows"].__set__
+_set_start: Any = vars(State)["_start"].__set__
 
 
 def state_reader(places: Mapping[str, int], rows: memoryview) -> Callable[[int], State]:
-    """Return a function for the state of a row; quicker than the class, for every frame.
+    """Return a function for the state of a row, which it reads from `rows` when it is asked.
 
-    `rows` has shape (frames, channels).
+    So it costs little in every frame. `rows` has shape (frames, channels). Before a row changes,
+    `copy_row` gives its state numbers of its own.
     """
-    size, flat = _NUMBER_bytes * len(places), rows.cast("B")
-    new, set_places, set_values = object.__new__, _set_places, _set_values
+    shared, width = Rows(places, rows.cast("B").cast("d")), len(places)
+    new, set_rows, set_start = object.__new__, _set_rows, _set_start
 
     def read(k: int) -> State:
         state = new(State)
-        set_places(state, places)
-        set_values(state, flat[k * size : k * size + size].tobytes())
+        set_rows(state, shared)
+        set_start(state, k * width)
         return state
 
     return read
+
+
+def copy_row(state: State) -> None:
+    """Give a state numbers of its own, before the row that it is read from changes."""
+    numbers = memoryview(state._own().tobytes()).cast("d")
+    _set_rows(state, Rows(state._rows.places, numbers))
+    _set_start(state, 0)
 
 
 def time_of(state: State) -> str:

@@ -8,6 +8,7 @@ sources in `coupled/rig` and of those beside the entry.
 
 from __future__ import annotations
 
+import ctypes
 import hashlib
 import os
 from collections.abc import Callable
@@ -22,7 +23,7 @@ from llvmlite import binding, ir
 from numba import types
 from numba.core import config
 from numba.core.caching import FunctionCache
-from numba.core.registry import CPUDispatcher
+from numba.core.registry import CPUDispatcher, cpu_target
 from numba.core.runtime import rtsys
 from numba.extending import intrinsic
 
@@ -149,11 +150,94 @@ carray: Any = numba.carray
 
 
 def machine_code(kernel: Any, *arguments: Any) -> int:
-    """Return the address of an entry's machine code, for `call_at`; it raises no error."""
+    """Return the address of an entry's machine code, for `call_at`; it raises no error.
+
+    A wheel has the code for the platform where it was built. On another platform, and after a
+    change of the sources, the entry is compiled.
+    """
+    if (file := _shipped_file(kernel)) is not None:
+        return load(file, kernel.py_func.__name__)
     bound(kernel, *arguments)
     compiled = kernel.overloads[tuple(_type_of(argument) for argument in arguments)]
     name = compiled.fndesc.llvm_cfunc_wrapper_name
     return int(compiled.library.get_pointer_to_function(name))
+
+
+def function_at(address: int) -> Callable[[int, int], float]:
+    """Return the machine code at an address, of two whole numbers, as a function for Python."""
+    return cast(
+        Callable[[int, int], float],
+        ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_int64, ctypes.c_int64)(address),
+    )
+
+
+# What a wheel's code needs of a processor, by architecture: of x86-64 that of the years after 2013.
+_LEVELS = {"x86_64": ("x86-64-v3", ("avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe"))}
+_SHIPPED = Path(__file__).parents[1] / "shipped" / "machine"
+_engines: list[Any] = []  # the code lasts as long as they do
+
+
+def shippable(kernel: Any) -> tuple[str, bytes]:
+    """Return file name and contents of the machine code of an entry of two whole numbers.
+
+    It needs no Python, and the C library's mathematics only, if the entry allocates nothing. An
+    entry that raises an error returns 0.
+    """
+    function, kinds = kernel.py_func, (types.int64, types.int64)
+    dispatcher = numba.njit(function, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+    dispatcher.compile(kinds)
+    compiled = dispatcher.overloads[kinds]
+    module, name = binding.parse_assembly(compiled.library.get_llvm_str()), function.__name__
+    mangled = compiled.fndesc.mangled_name
+    module.link_in(binding.parse_assembly(str(_plain(mangled, name))), preserve=False)
+    return _shipped_name(function), _emitted(module, name, _level()[0])
+
+
+def _plain(mangled: str, name: str) -> Any:
+    """Return a module with the function `double name(int64_t, int64_t)`, which calls numba's."""
+    module, whole, number = ir.Module(), ir.IntType(64), ir.DoubleType()
+    result, fault = number.as_pointer(), ir.IntType(8).as_pointer()
+    native = ir.FunctionType(ir.IntType(32), [result, fault.as_pointer(), whole, whole])
+    called = ir.Function(module, native, mangled)
+    function = ir.Function(module, ir.FunctionType(number, [whole, whole]), name)
+    builder = ir.IRBuilder(function.append_basic_block())
+    found, raised = builder.alloca(number), builder.alloca(fault)
+    builder.store(ir.Constant(number, 0.0), found)
+    builder.call(called, [found, raised, *function.args])
+    builder.ret(builder.load(found))
+    return module
+
+
+def _level() -> tuple[str, tuple[str, ...]]:
+    """Return the processor for which a wheel's code is made, and what it needs of this one."""
+    return _LEVELS.get(binding.get_default_triple().partition("-")[0], ("", ()))
+
+
+def _shipped_name(function: Callable[..., Any]) -> str:
+    version = _folder_of_version("", Path(function.__code__.co_filename).parent).name
+    return f"{function.__name__}-{version}-{binding.get_default_triple()}.o"
+
+
+def _shipped_file(kernel: Any) -> Path | None:
+    """Return the file of an entry's machine code for this platform, if the package has one."""
+    if not _SHIPPED.is_dir():
+        return None
+    file, has = _SHIPPED / _shipped_name(kernel.py_func), binding.get_host_cpu_features()
+    return file if file.is_file() and all(has.get(need) for need in _level()[1]) else None
+
+
+@lru_cache(maxsize=8)
+def load(file: Path, name: str) -> int:
+    """Return the address of a function in an object file, loaded for as long as the process."""
+    rtsys.initialize(cpu_target.target_context)  # names numba's functions that the code refers to
+    binding.initialize_native_target()
+    binding.initialize_native_asmprinter()
+    machine = binding.Target.from_default_triple().create_target_machine()
+    engine = binding.create_mcjit_compiler(binding.parse_assembly(""), machine)
+    engine.add_object_file(binding.ObjectFileRef.from_data(file.read_bytes()))
+    engine.finalize_object()
+    _engines.append(engine)
+    return int(engine.get_function_address(name))
 
 
 def object_code(function: Callable[..., Any], name: str, *arguments: Any) -> bytes:
@@ -182,14 +266,19 @@ def object_code(function: Callable[..., Any], name: str, *arguments: Any) -> byt
 
 def _object_code(library: Any, mangled: str, name: str) -> bytes:
     module = binding.parse_assembly(library.get_llvm_str())
+    function = module.get_function(mangled)
+    function.visibility, function.name = "hidden", name
+    return _emitted(module, name)
+
+
+def _emitted(module: Any, name: str, processor: str = "") -> bytes:
+    """Return a module's object code, for a processor or for any, with one symbol not local."""
     for each in (*module.functions, *module.global_variables):
         if not each.is_declaration:
-            each.linkage = "internal"
-    function = module.get_function(mangled)
-    function.linkage, function.visibility, function.name = "external", "hidden", name
+            each.linkage = "external" if each.name == name else "internal"
     module.verify()
     target = binding.Target.from_default_triple()
-    machine = target.create_target_machine(opt=2, reloc="pic", codemodel="default")
+    machine = target.create_target_machine(cpu=processor, opt=2, reloc="pic", codemodel="default")
     return bytes(machine.emit_object(module))
 
 
@@ -217,6 +306,8 @@ def _cache_folder(chosen: str, beside: Path) -> str:
 
 def compiled_before(kernel: Any) -> bool:
     """Tell whether an entry's machine code is on disk, so that it need not be compiled."""
+    if _shipped_file(kernel) is not None:
+        return True
     cache = getattr(kernel, "_cache", None)
     folder = Path(str(getattr(cache, "cache_path", "")))
     return any(folder.glob(f"*.{kernel.py_func.__name__}-*.nbc"))

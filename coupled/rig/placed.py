@@ -46,6 +46,10 @@ def _words(first: str, last: str) -> tuple[int, int]:
 
 _WORDS = CONTROL.itemsize // 8
 _PRODUCT, _PRODUCT_END = _words("schedule", "modification")
+# The last of them are the nodes of a curve, of which most rigs have none.
+_FIELDS: Any = CONTROL_STATE.fields["modification"][0].fields
+_NODES = _words("modification", "modification")[0] + _FIELDS["node_at"][1] // 8
+_CURVED = _words("modification", "modification")[0] + _FIELDS["curved"][1] // 8
 _SERVICES, _SERVICES_END = _words("services", "services")
 _SURFACE, _SURFACE_END = _words("compensation", "surface")
 
@@ -233,7 +237,8 @@ def _host_of(address: int, k: int, phase: int) -> float:
     before = carray(pointer(at[_KEPT_CONTROLS]), words, np.int64)
     for i in range(at[1]):
         start = i * _WORDS
-        for j in range(_PRODUCT, _PRODUCT_END):
+        end = _PRODUCT_END if controls[start + _CURVED] != 0 else _NODES
+        for j in range(_PRODUCT, end):
             before[start + j] = controls[start + j]
         for j in range(_SERVICES, _SERVICES_END):
             before[start + j] = controls[start + j]

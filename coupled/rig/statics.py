@@ -20,17 +20,26 @@ cached on disk.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import cast
+from functools import lru_cache
+from typing import NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from coupled.record.channels import ControlName
 from coupled.rig.compensation import estimate
-from coupled.rig.compiled import entry, seldom, stage
-from coupled.rig.control import ControlArray, ControlParameters, ControlState
+from coupled.rig.compiled import (
+    carray,
+    entry,
+    function_at,
+    machine_code,
+    pointer,
+    seldom,
+    stage,
+)
+from coupled.rig.control import CONTROL, ControlArray, ControlParameters, ControlState
 from coupled.rig.crossing import leaks
 from coupled.rig.equations import basic_force, specified_force
 from coupled.rig.linkage import LinkageParameters, bend, contact_displacement
@@ -51,6 +60,9 @@ Floats = NDArray[np.float64]
 loader_force = stage(basic_force)  # eq. (8)
 
 
+# What `static_at` computes: F at each δc; δ, δ̂ and the command for each δc and F; δc and F at δ.
+_ALONG, _MADE_OF, _POINT = range(3)
+_ROWS = 5  # δc, F, δ, δ̂ and the command
 _NO_FORCE_N = 1e-9  # rounding of zero force
 _HALVINGS = 200  # from the widest force to the last digit of a double, and more
 
@@ -113,10 +125,11 @@ def static_line(
     """
     others = crossed(rig, control, others_N or {})
     packed = pack(rig, only=control)
-    at = np.ascontiguousarray(computed, dtype=np.float64)
-    force = np.empty(len(at))
-    _along(packed, float(pressure_Pa), others.leaked, at, force)
-    return _line(rig, control, pressure_Pa, packed, 0, at, force, others)
+    rows = np.full((_ROWS, len(computed)), np.nan)
+    rows[0] = computed
+    given = _Given(float(pressure_Pa), others.leaked, others.bent, others.added)
+    _run(_ALONG, packed, 0, given, rows)
+    return _line(rig, control, packed, 0, given, rows)
 
 
 def static_point(
@@ -140,11 +153,13 @@ def static_point(
     others = crossed(rig, control, others_N or {})
     wanted = float(deflection) - others.bent
     weight = rig.controls[cast(ControlName, control)].loader.bob_weight * (load_factor - 1.0)
-    found = _point_at(packed, float(pressure_Pa), others.leaked - weight, wanted)
-    computed, force = (np.array([value]) for value in found)
-    point = _line(rig, control, pressure_Pa, packed, frame, computed, force, others)
+    leaked = others.leaked - weight
+    given = _Given(float(pressure_Pa), leaked, others.bent, others.added, wanted)
+    rows = np.full((_ROWS, 1), np.nan)
+    _run(_POINT, packed, frame, given, rows)
+    point = _line(rig, control, packed, frame, given, rows)
     loader = rig.controls[cast(ControlName, control)].loader
-    if loader.play * loader.play_stiffness > 0.0 and abs(found[1]) < _NO_FORCE_N:
+    if loader.play * loader.play_stiffness > 0.0 and abs(point.force[0]) < _NO_FORCE_N:
         at = np.array([float(deflection)])  # inside the backlash
         return replace(
             point, deflection=at, specified=specified_force(rig, control, pressure_Pa, at)
@@ -152,21 +167,40 @@ def static_point(
     return point
 
 
+class _Given(NamedTuple):
+    """Numbers for `static_at`: q̄ in Pa, forces in N, deflections in d.
+
+    `leaked` is others' crosstalk on the loader, `bent` the bend by their forces, `added` the host's
+    correction for it, `wanted` the δ of a point.
+    """
+
+    pressure: float
+    leaked: float
+    bent: float
+    added: float
+    wanted: float = 0.0
+
+
+def _run(what: int, packed: ControlArray, frame: int, given: _Given, rows: Floats) -> None:
+    """Run `static_at` on arrays."""
+    numbers = np.array(given)
+    arrays = (packed.ctypes.data, numbers.ctypes.data, rows.ctypes.data)
+    place = np.array([*arrays, rows.shape[1], frame])
+    _static()(place.ctypes.data, what)
+
+
+@lru_cache(maxsize=1)
+def _static() -> Callable[[int, int], float]:
+    return function_at(machine_code(static_at, 0, 0))
+
+
 def _line(
-    rig: Rig,
-    control: str,
-    pressure_Pa: float,
-    packed: ControlArray,
-    frame: int,
-    computed: Floats,
-    force: Floats,
-    others: Others,
+    rig: Rig, control: str, packed: ControlArray, frame: int, given: _Given, rows: Floats
 ) -> Statics:
-    out = np.empty((3, len(computed)))
-    beside = (others.bent, others.added)
-    _made_of(packed, float(pressure_Pa), frame, computed, force, beside, out)
-    deflection, estimates, commands = out
-    wanted = specified_force(rig, control, pressure_Pa, deflection)
+    """Return the line of δc and F, the first two rows."""
+    _run(_MADE_OF, packed, frame, given, rows)
+    computed, force, deflection, estimates, commands = rows
+    wanted = specified_force(rig, control, given.pressure, deflection)
     return Statics(computed, force, deflection, estimates, commands, wanted)
 
 
@@ -215,7 +249,7 @@ def _yields(p: LinkageParameters, force: float) -> float:
     return bend(p, force) + contact_displacement(p, force)
 
 
-@entry
+@seldom
 def _along(
     controls: ControlArray, pressure: float, leaked: float, computed: Floats, out: Floats
 ) -> None:
@@ -227,7 +261,7 @@ def _along(
         out[i] = _force(p, s, computed[i], frame, side) - leaked
 
 
-@entry
+@seldom
 def _made_of(
     controls: ControlArray,
     pressure: float,
@@ -269,7 +303,7 @@ def _force_for(p: LinkageParameters, by: float, low: float, high: float) -> floa
     return 0.5 * (low + high)
 
 
-@entry
+@seldom
 def _point_at(
     controls: ControlArray, pressure: float, leaked: float, deflection: float
 ) -> tuple[float, float]:
@@ -307,3 +341,20 @@ def _point_at(
             far = middle
         else:
             near = middle
+
+
+@entry
+def static_at(address: int, what: int) -> float:
+    """Compute `_ALONG`, `_MADE_OF` or `_POINT` on the arrays at `address`; return 0."""
+    at = carray(pointer(address), 5, np.int64)
+    controls = carray(pointer(at[0]), (1,), CONTROL)
+    given = carray(pointer(at[1]), 5, np.float64)
+    rows = carray(pointer(at[2]), (_ROWS, at[3]), np.float64)
+    if what == _ALONG:
+        _along(controls, given[0], given[1], rows[0], rows[1])
+    elif what == _MADE_OF:
+        beside = (given[2], given[3])
+        _made_of(controls, given[0], at[4], rows[0], rows[1], beside, rows[2:])
+    else:
+        rows[0, 0], rows[1, 0] = _point_at(controls, given[0], given[1], given[4])
+    return 0.0

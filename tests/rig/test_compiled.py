@@ -2,15 +2,28 @@
 
 from __future__ import annotations
 
+import math
 import os
 import shutil
 import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+from llvmlite import binding
 
 import coupled
+from coupled.rig import compiled
+from coupled.rig.compiled import (
+    carray,
+    compiled_before,
+    entry,
+    function_at,
+    machine_code,
+    pointer,
+    shippable,
+)
 
 REPLAY = """
 import numpy as np
@@ -94,3 +107,32 @@ def start(cache: Path) -> list[str]:
 def test_a_second_start_loads_no_compiler_and_no_linear_algebra(tmp_path: Path) -> None:
     assert start(tmp_path)[:2] == ["False", "True"]
     assert start(tmp_path) == ["True", "True", "False", "False"]
+
+
+@entry
+def scaled(address: int, k: int) -> float:
+    """Return the number at an address, raised by the C library to a power."""
+    return float(carray(pointer(address), 1, np.float64)[0] ** (1.0 / k))
+
+
+def test_code_that_comes_with_the_package_runs_where_it_can(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    name, code = shippable(scaled)
+    (tmp_path / name).write_bytes(code)
+    number = np.array([1.7])
+    wanted, place = math.pow(1.7, 1.0 / 3.0), int(number.ctypes.data)
+    compiled_here = function_at(machine_code(scaled, 0, 0))
+    monkeypatch.setattr(compiled, "_SHIPPED", tmp_path)
+    assert compiled_before(scaled)
+    with monkeypatch.context() as without:
+        without.setattr(compiled, "bound", None)  # cannot compile
+        assert function_at(machine_code(scaled, 0, 0))(place, 3) == wanted
+    assert compiled_here(place, 3) == wanted
+    # Not on an older processor, and not after a change of the sources.
+    if compiled._level()[1]:
+        with monkeypatch.context() as older:
+            older.setattr(binding, "get_host_cpu_features", dict)
+            assert compiled._shipped_file(scaled) is None
+    (tmp_path / name).rename(tmp_path / name.replace("kernels-", "kernels-0"))
+    assert compiled._shipped_file(scaled) is None
