@@ -15,7 +15,7 @@ import coupled.cli
 from coupled.cli.gaps import in_words
 from coupled.cli.tables import print_table
 from coupled.display import in_system, split_unit
-from coupled.gap.findings.power import EffectPower
+from coupled.gap.findings.proposal import EffectPower
 from coupled.gap.findings.result import EffectResult, ParameterEstimate
 from coupled.plots.maps import draw_losses
 from coupled.tables.gaps import effects_table, power_table

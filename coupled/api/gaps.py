@@ -8,11 +8,11 @@ from os import PathLike
 from coupled.api.records import Given, named_records
 from coupled.api.rigs import rig_given
 from coupled.arguments import public
+from coupled.gap.checks import rig_of_manifests
 from coupled.gap.diagnose import Diagnosis
 from coupled.gap.diagnose import diagnose as diagnose_records
 from coupled.gap.nominal import fit_nominal
 from coupled.gap.nominalfit import NominalFit
-from coupled.gap.trimmed import rig_of_manifests
 from coupled.record.channels import ControlName
 from coupled.rig.rig import Rig
 

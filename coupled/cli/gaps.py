@@ -167,8 +167,8 @@ def _diagnose(
     healthy: list[Path],
     terms: bool,
 ) -> tuple[Diagnosis, dict[str, Record]]:
+    from coupled.gap.checks import rig_of_manifests
     from coupled.gap.diagnose import diagnose as find_gap
-    from coupled.gap.trimmed import rig_of_manifests
     from coupled.rig.rigfile import read_rig
 
     nominal = None if rig_file is None else read_rig(rig_file)
@@ -234,8 +234,8 @@ def _write_improved(
 ) -> None:
     from coupled.calibration.assumed import outdated_bends
     from coupled.files import read_text
+    from coupled.gap.checks import rig_of_manifests, trimmed
     from coupled.gap.findings.summary import change
-    from coupled.gap.trimmed import rig_of_manifests, trimmed
     from coupled.rig.rigedit import differences, edited
     from coupled.rig.rigfile import read_rig
     from coupled.rig.rigwrite import rig_text

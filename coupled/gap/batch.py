@@ -21,8 +21,7 @@ import coupled
 from coupled.errors import InputError, collected, nearest, together
 from coupled.files import check_target, json_text, read_json, sha256, write_text
 from coupled.gap.diagnose import diagnose
-from coupled.gap.findings.document import diagnosis_from
-from coupled.gap.findings.result import FORMAT, placed
+from coupled.gap.findings.result import FORMAT, diagnosis_from, placed
 from coupled.parallel import as_done, cores, executor
 from coupled.record.channels import ControlName
 from coupled.record.record import Record, read_record

@@ -18,20 +18,18 @@ from typing import TypeVar
 
 from coupled.gap.chain import Part
 from coupled.gap.findings.answer import effects_of, incredible, settings_of, verdict_of
-from coupled.gap.findings.budget import stage_budget
+from coupled.gap.findings.budget import floors_of, shrink, stage_budget
 from coupled.gap.findings.curves import find_curves
 from coupled.gap.findings.diagnosis import Diagnosis, PartDiagnosis
 from coupled.gap.findings.healthy import Baseline, beside_healthy
-from coupled.gap.findings.inseparable import inseparable
 from coupled.gap.findings.judge import Judge
 from coupled.gap.findings.result import StageResult
-from coupled.gap.findings.shrink import floors_of, shrink
 from coupled.gap.findings.whole import WholeDiagnosis
 from coupled.gap.parts import moves, parts_of
 from coupled.gap.prepare import Prepared, prepare
 from coupled.gap.search.case import Case, Tell
 from coupled.gap.search.descent import Descent
-from coupled.gap.search.found import Choice
+from coupled.gap.search.found import Choice, inseparable
 from coupled.gap.search.histories import search
 from coupled.gap.search.problem import Problem
 from coupled.parallel import in_threads, threads

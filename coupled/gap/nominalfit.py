@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from coupled.gap.findings.inseparable import Alike
+from coupled.gap.search.found import Alike
 from coupled.record.channels import ControlName
 from coupled.results import TableResult, frame_of
 from coupled.rig.rig import Rig

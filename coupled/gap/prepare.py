@@ -12,12 +12,11 @@ from functools import partial
 
 from coupled.errors import InputError
 from coupled.gap.chain import AIRFRAME, Part
-from coupled.gap.checks import check_record, check_trim
+from coupled.gap.checks import check_record, check_trim, trim_speed, trimmed
 from coupled.gap.effects.effect import Effect, keys_of
 from coupled.gap.effects.library import library_of
 from coupled.gap.findings.healthy import Baseline
-from coupled.gap.search.case import Case, Tell
-from coupled.gap.search.contact import allowing_for_contact
+from coupled.gap.search.case import Case, Tell, allowing_for_contact
 from coupled.gap.signals.drives import as_counted, as_driven
 from coupled.gap.signals.live import judged_part, live_of
 from coupled.gap.signals.output import Output
@@ -29,13 +28,13 @@ from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points
 from coupled.gap.stages.terms import with_terms
 from coupled.gap.stages.tried import tried_effects
-from coupled.gap.thresholds import RIGS_KEPT
-from coupled.gap.trimmed import trim_speed, trimmed
 from coupled.parallel import in_threads
 from coupled.record.channels import ControlName
 from coupled.record.record import Record
 from coupled.rig.parameters import Flight
 from coupled.rig.rig import Rig
+
+_KEPT = 3  # rigs whose noise floors are cached
 
 
 @dataclass(frozen=True)
@@ -145,7 +144,7 @@ class Judged:
         known = next((made for other, made in self._known if other == rig), None)
         if known is None:
             known = self._made(rig)
-            self._known[:] = [*self._known[1 - RIGS_KEPT :], (rig, known)]
+            self._known[:] = [*self._known[1 - _KEPT :], (rig, known)]
         return known
 
     def _made(self, rig: Rig) -> list[Output]:

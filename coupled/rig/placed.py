@@ -47,7 +47,8 @@ def _words(first: str, last: str) -> tuple[int, int]:
 _WORDS = CONTROL.itemsize // 8
 _PRODUCT, _PRODUCT_END = _words("schedule", "modification")
 # The last of them are the nodes of a curve, of which most rigs have none.
-_FIELDS: Any = CONTROL_STATE.fields["modification"][0].fields
+_STATES: Any = CONTROL_STATE.fields
+_FIELDS = _STATES["modification"][0].fields
 _NODES = _words("modification", "modification")[0] + _FIELDS["node_at"][1] // 8
 _CURVED = _words("modification", "modification")[0] + _FIELDS["curved"][1] // 8
 _SERVICES, _SERVICES_END = _words("services", "services")

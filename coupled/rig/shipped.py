@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 from coupled.rig.compiled import load, shippable
 from coupled.rig.placed import step_frame_at
@@ -14,7 +15,8 @@ def write_machine_code(folder: Path) -> None:
 
     Each is loaded, which ends the process if the platform lacks a function that the code calls.
     """
-    for kernel in (step_frame_at, static_at):
+    kernels: tuple[Any, ...] = (step_frame_at, static_at)
+    for kernel in kernels:
         name, code = shippable(kernel)
         (folder / name).write_bytes(code)
         load(folder / name, kernel.py_func.__name__)

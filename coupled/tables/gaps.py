@@ -13,13 +13,11 @@ from coupled.tables.table import NONE, Mark, Row, Table
 
 if TYPE_CHECKING:
     from coupled.gap.batch import Row as Diagnosed
+    from coupled.gap.findings.budget import ChannelShrink
     from coupled.gap.findings.curves import Curve
     from coupled.gap.findings.diagnosis import Diagnosis
-    from coupled.gap.findings.flown import ChannelAgain
-    from coupled.gap.findings.inflight import EffectInFlight
-    from coupled.gap.findings.power import EffectPower
-    from coupled.gap.findings.proposal import ProposedTest
-    from coupled.gap.findings.shrink import ChannelShrink
+    from coupled.gap.findings.flown import ChannelAgain, EffectInFlight
+    from coupled.gap.findings.proposal import EffectPower, ProposedTest
     from coupled.gap.nominalfit import ChannelFit, Number
 
 

@@ -11,7 +11,7 @@ import coupled as api
 from coupled.errors import InputError
 from coupled.flight.aircraft import make_aircraft
 from coupled.flight.airframe import JSBSimAirframe
-from coupled.gap.findings.shrink import ChannelShrink, Shrink
+from coupled.gap.findings.budget import ChannelShrink, Shrink
 from coupled.gap.findings.summary import closes
 from coupled.record.channels import ELEVATOR, ControlName, channel
 from coupled.resources import aircraft_folder

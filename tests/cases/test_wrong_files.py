@@ -19,7 +19,7 @@ from coupled.blind.trials.answers import read_answers
 from coupled.blind.trials.key import check_seal, digest, read_key
 from coupled.blind.trials.score import score
 from coupled.flight.runfile import manoeuvres_from_table
-from coupled.gap.findings.document import diagnosis_from
+from coupled.gap.findings.result import diagnosis_from
 from coupled.resources import shipped_rigs, shipped_runs
 from coupled.rig.rigfile import read_rig, rig_from_table
 from tests.support.wrong import PLAIN, damaged, unexpected

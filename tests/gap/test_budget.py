@@ -10,16 +10,14 @@ import numpy as np
 import pytest
 
 from coupled.gap import diagnose as diagnosing
-from coupled.gap import prepare
 from coupled.gap.effects.effect import apply
 from coupled.gap.effects.library import BY_NAME, EFFECTS
 from coupled.gap.findings.budget import NOISE, UNEXPLAINED, _Blocks, _Weights
-from coupled.gap.findings.credibility import Credibility
+from coupled.gap.findings.credibility import Credibility, Regime, _size
 from coupled.gap.findings.diagnosis import Diagnosis
 from coupled.gap.findings.flown import ChannelAgain, nearer
-from coupled.gap.findings.regimes import Regime, _size
 from coupled.rig.replay import replay_linkage
-from tests.support.gaps import made, nominal_rig
+from tests.support.gaps import know_only, made, nominal_rig
 
 DRIVES = ("column_computed_m", "column_force_N")
 # Yields by 1 mm: twice as far as friction's contact may yield as a setting.
@@ -34,12 +32,6 @@ def shares(found: Diagnosis, stage: str) -> dict[str, float]:
     return budget.as_dict()
 
 
-def without(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Take an effect out of the library: it is then one that the library lacks."""
-    known = [e for e in EFFECTS if e.name != name]
-    monkeypatch.setattr(prepare, "library_of", lambda *_: known)
-
-
 @pytest.mark.slow
 def test_what_is_nearly_right_explains_most_and_says_what_remains(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -47,7 +39,7 @@ def test_what_is_nearly_right_explains_most_and_says_what_remains(
     """Friction that yields, held against Coulomb's alone: found to 3 %, and the rest described."""
     nominal = nominal_rig(False)
     record = made(tmp_path, nominal, {"presliding_friction": FRICTION}, 4)
-    without("presliding_friction", monkeypatch)
+    know_only(monkeypatch, [e for e in EFFECTS if e.name != "presliding_friction"])
     found = diagnosing.diagnose(nominal, {"r": record.between(0.0, 20.0)})
     assert found.verdict == "mostly"
     [effect] = found.effects

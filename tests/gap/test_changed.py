@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from coupled.gap import prepare
 from coupled.gap.diagnose import diagnose
 from coupled.gap.findings.changed import Comparison, Interval, compare
 from coupled.gap.signals.output import Output
@@ -16,6 +15,7 @@ from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
+from tests.support.gaps import know_only
 from tests.support.machines import plain_rig
 
 
@@ -135,7 +135,7 @@ def test_a_diagnosis_against_healthy_records_names_the_stage_that_changed(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """With an empty library: what no effect explains is named all the same."""
-    monkeypatch.setattr(prepare, "library_of", lambda rig, control: [])
+    know_only(monkeypatch, [])
     well = {f"well{i}": one for i, one in enumerate(WELL)}
     rig = screw_rig()
     same = diagnose(rig, {"r": screw(70)}, healthy=well)
@@ -153,7 +153,7 @@ def test_a_diagnosis_against_healthy_records_names_the_stage_that_changed(
 def test_a_verdict_needs_healthy_records_that_would_show_a_change(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(prepare, "library_of", lambda rig, control: [])
+    know_only(monkeypatch, [])
     alone = diagnose(screw_rig(), {"r": screw(70)}, healthy={"w": WELL[0]})
     assert alone.verdict == "ambiguous"
     assert "cannot be decided" in alone.summary

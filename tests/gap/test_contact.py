@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from coupled.gap.search.contact import allowing_for_contact, contact_start
+from coupled.gap.search.case import allowing_for_contact, contact_start
 from coupled.gap.signals.output import Output
 from coupled.gap.thresholds import FAULTY_FROM, MISMATCH
 from tests.support.rigs import bench

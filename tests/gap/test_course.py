@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from coupled.gap.diagnose import diagnose
-from coupled.gap.findings.onset import in_time
+from coupled.gap.findings.where import in_time
 from coupled.gap.search.course import Bounds, Course, Timing, course_of, course_of_events, timing_of
 from coupled.record.record import Record
 from tests.support.gaps import LONG_s, made, nominal_rig

@@ -14,7 +14,7 @@ from coupled.gap.diagnose import findings
 from coupled.gap.findings.diagnosis import PartDiagnosis
 from coupled.gap.prepare import prepare
 from coupled.gap.search.beam import search_sets
-from coupled.gap.signals.sensed import Sensed
+from coupled.gap.signals.reading import Sensed
 from coupled.plots.curves import draw_curves
 from coupled.plots.gapview import View
 from coupled.record.record import write_record

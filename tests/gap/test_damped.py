@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
-from coupled.gap.search.damped import descend
+from coupled.gap.search.descent import descend
 
 Floats = NDArray[np.float64]
 RNG = np.random.default_rng(11)

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from coupled.gap.noise.filters import filtered
+from coupled.gap.noise.noise import filtered
 from coupled.gap.search.descent import Descent, leaves_noise
-from coupled.gap.signals.output import Output
-from coupled.gap.signals.steps import coarsely_stepped
-from coupled.gap.thresholds import RACE_EVALUATIONS, COARSE_STEPS_Hz
+from coupled.gap.signals.output import Output, coarsely_stepped
+from coupled.gap.thresholds import ROUNDS, COARSE_STEPS_Hz
 from coupled.rig.rig import Rig
 from tests.support import gaps
 
@@ -57,7 +56,7 @@ def test_a_fit_of_dry_friction_ends_sooner_where_the_rest_remembers_itself(
     memory: float, dry: bool, sooner: bool
 ) -> None:
     """A frame of it says less, and the last steps along a valley gain nothing that it tells."""
-    white = np.random.default_rng(7).normal(size=4000)
+    white = np.random.default_rng(7).normal(size=800)
     left = filtered([np.sqrt(1.0 - memory**2)], [1.0, -memory], white)
     asked: list[int] = []
 
@@ -65,8 +64,7 @@ def test_a_fit_of_dry_friction_ends_sooner_where_the_rest_remembers_itself(
         asked.append(1)
         return np.concatenate((left, [60.0 * (scaled[1] - scaled[0] ** 2), 4.0 * (1 - scaled[0])]))
 
-    rows = np.ones(4002, dtype=bool)
-    Descent(dry=dry).end(valley, [np.array([-1.2, 1.0])], ENDS, stepped=False, rows=rows)
+    Descent(dry=dry).end(valley, [np.array([-1.2, 1.0])], ENDS, stepped=False)
     assert (len(asked) < 60) == sooner
 
 
@@ -92,7 +90,7 @@ def test_a_start_that_is_far_behind_is_given_up() -> None:
     ends = (np.array([0.0]), np.array([100.0]))
     Descent().end(far, [np.array([90.0]), np.array([1.5])], ends, stepped=False)
     on_the_shelf = sum(value > 10.0 for value in asked)
-    assert 0 < on_the_shelf <= 3 * RACE_EVALUATIONS
+    assert 0 < on_the_shelf <= 3 * (2 * ROUNDS)
 
 
 def test_what_is_left_is_noise_up_to_a_tenth_more() -> None:

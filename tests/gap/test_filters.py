@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 from scipy.signal import bilinear, lfilter, welch
 
 from coupled.gap.findings.where import _peak
-from coupled.gap.noise.filters import filtered, of_second_order
-from coupled.gap.noise.noise import Noise
+from coupled.gap.noise.noise import Noise, filtered, of_second_order
 
 RATE_Hz = 120.0
 

@@ -12,8 +12,8 @@ import pytest
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from coupled.gap.findings.flexible import free_share
 from coupled.gap.findings.summary import in_figures
+from coupled.gap.findings.where import free_share
 from coupled.gap.noise.noise import Noise, noise_of
 from coupled.gap.noise.smooth import Smoother
 from coupled.gap.signals.output import Output, spread

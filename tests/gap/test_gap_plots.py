@@ -16,10 +16,10 @@ from coupled.gap.chain import Part
 from coupled.gap.diagnose import diagnose
 from coupled.gap.effects.effect import Effect, apply
 from coupled.gap.effects.library import BY_NAME, EFFECTS
+from coupled.gap.findings.budget import ChannelShrink, Shrink
 from coupled.gap.findings.diagnosis import PartDiagnosis
 from coupled.gap.findings.flown import fly_force
 from coupled.gap.findings.result import EffectResult, ParameterEstimate, StageResult
-from coupled.gap.findings.shrink import ChannelShrink, Shrink
 from coupled.gap.search.found import Candidate, Choice, Fit, Found
 from coupled.gap.signals.output import Output, stage_gaps
 from coupled.gap.stages.airframe import airframe_outputs

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from coupled.gap.diagnose import diagnose
 from coupled.gap.signals.air import vertical_air
+from coupled.gap.signals.floors import share_from_source
 from coupled.gap.signals.output import Output, white
-from coupled.gap.signals.shared import share_from_source
 from coupled.gap.thresholds import CERTAIN, STRETCH_s
 from coupled.record.record import write_record
 from coupled.rig.rig import Rig

@@ -20,7 +20,7 @@ from coupled.gap.findings.healthy import ModelError, tolerances
 from coupled.gap.search.case import Case
 from coupled.gap.search.problem import Problem
 from coupled.gap.signals.output import Floats, Output, Predict
-from coupled.gap.thresholds import HEALTHY_ALONE, HEALTHY_SIGMAS
+from coupled.gap.thresholds import ROUGH, SIGMAS
 from coupled.record.record import Record, read_record
 from coupled.rig.rig import Rig
 from coupled.rig.rigfile import read_rig
@@ -131,7 +131,7 @@ def test_an_effects_tolerance_is_its_scatter_from_record_to_record() -> None:
     found = Problem(case).fit((damping,))
     [wide] = tolerances(case, found).values()
     filed = rig.controls["column"].loader.damping
-    assert wide == pytest.approx(HEALTHY_SIGMAS * np.std([1.1, 1.2, 1.4], ddof=1) * filed, rel=0.01)
+    assert wide == pytest.approx(SIGMAS * np.std([1.1, 1.2, 1.4], ddof=1) * filed, rel=0.01)
 
 
 def test_a_channel_that_the_rig_repeats_to_the_last_digit_has_no_error() -> None:
@@ -143,4 +143,4 @@ def test_a_channel_that_the_rig_repeats_to_the_last_digit_has_no_error() -> None
     ]
     error = ModelError.of(exact, bench())
     assert (error.rms, error.by_stretch) == (0.0, 0.0)
-    assert error.by_record == pytest.approx(HEALTHY_ALONE / np.sqrt(2.0))
+    assert error.by_record == pytest.approx(ROUGH / np.sqrt(2.0))

@@ -11,9 +11,8 @@ import pytest
 
 from coupled.gap.effects.effect import apply
 from coupled.gap.effects.library import BY_NAME
-from coupled.gap.findings.flown import Again, fly_force
-from coupled.gap.findings.inflight import EffectInFlight, in_flight, in_words
-from coupled.gap.findings.shapley import shapley_weights
+from coupled.gap.findings.budget import shapley_weights
+from coupled.gap.findings.flown import Again, EffectInFlight, fly_force, in_flight, in_words
 from coupled.gap.search.case import Case
 from coupled.gap.search.found import Fit
 from coupled.record.record import Record

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from coupled.gap.effects.library import BY_NAME
-from coupled.gap.findings.inseparable import inseparable
 from coupled.gap.search.case import Case
+from coupled.gap.search.found import inseparable
 from coupled.gap.search.problem import Problem
 from coupled.gap.signals.output import Floats, Output
 from coupled.rig.rig import Rig

@@ -9,8 +9,7 @@ import pytest
 
 from coupled.gap.chain import Part
 from coupled.gap.diagnose import Diagnosis, diagnose
-from coupled.gap.effects.effect import Effect, Signature
-from coupled.gap.effects.entries import added
+from coupled.gap.effects.effect import Effect, Signature, added
 from coupled.gap.prepare import prepare
 from coupled.gap.search.beam import search_sets
 from coupled.record.record import Record

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from coupled.gap.noise.noise import Noise, noise_of
-from coupled.gap.noise.quiet import noise_of_input, quiet_noise
+from coupled.gap.noise.noise import Noise, noise_of, noise_of_input, quiet_noise
 from coupled.gap.signals.floors import left_noise
 
 FRAMES, RATE_Hz = 4800, 120.0

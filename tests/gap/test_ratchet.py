@@ -11,11 +11,11 @@ from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import Manoeuvre, PressureProfile
 from coupled.flight.pilot import ForceTable
 from coupled.gap.effects.library import BY_NAME
-from coupled.gap.noise.resting import Rest
+from coupled.gap.noise.smooth import Rest
 from coupled.gap.search.fit import fit_alone
-from coupled.gap.signals import driven
-from coupled.gap.stages import ratchet
-from coupled.gap.stages.ratchet import without_backlash_creep
+from coupled.gap.signals import floors
+from coupled.gap.stages import inputs
+from coupled.gap.stages.inputs import without_backlash_creep
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points
 from coupled.record.record import Record
@@ -86,14 +86,14 @@ def test_noise_of_a_held_force_walks_no_contact(
         assert loader.gap(real) < 1.1
         assert loader.rough is None
         nowhere = Rest(np.zeros(len(record)), np.zeros(len(record)))
-        monkeypatch.setattr(driven, "rest_of", lambda *_, nowhere=nowhere: nowhere)
+        monkeypatch.setattr(floors, "rest_of", lambda *_, nowhere=nowhere: nowhere)
         outputs = Reader(rig, record, "column", surface_points).outputs()
         (loader,) = (output for output in outputs if output.stage == "loader")
         assert loader.gap(real) < 1.6
         # Slopes are taken without putting the walk back: a replay for three, and nearly the same.
         assert loader.rough is not None
         assert np.any(loader.rough(real) != loader.predict(real))
-        monkeypatch.setattr(ratchet, "CREEP_WORSE", (1e9, 2e9))  # remove all creep
+        monkeypatch.setattr(inputs, "CREEP_WORSE", (1e9, 2e9))  # remove all creep
         other = rig.changed({stiffness: 7.5 / 1.4e-4, "controls.column.loader.friction_N": 7.6})
         moved, roughly = (
             output_of(other) - output_of(real) for output_of in (loader.predict, loader.rough)

@@ -26,7 +26,7 @@ def resized(name: str, values: dict[str, float], times: float) -> dict[str, floa
     value = values[first.name]
     if first.mode == "factor":
         return {**values, first.name: 1.0 + times * (value - 1.0)}
-    if first.inverse:
+    if first.is_limit:
         return {**values, first.name: value / times**0.2}
     if first.key == "loader.bend_{d}_per_N":
         filed = nominal_rig(False).controls["column"].loader.bend

@@ -13,10 +13,9 @@ from numpy.typing import NDArray
 from coupled.gap.effects.effect import apply
 from coupled.gap.effects.library import BY_NAME
 from coupled.gap.noise.noise import Noise
-from coupled.gap.noise.resting import Rest, rest_of
-from coupled.gap.noise.smooth import smoothed
-from coupled.gap.signals import driven
-from coupled.gap.signals.driven import Drive
+from coupled.gap.noise.smooth import Rest, rest_of, smoothed
+from coupled.gap.signals import floors
+from coupled.gap.signals.floors import Drive
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points
 from coupled.rig.rig import Rig
@@ -172,7 +171,7 @@ def test_a_hand_that_rests_walks_neither_a_contact_nor_a_play(
 
     held = left()
     nowhere = Rest(np.zeros(len(record)), np.zeros(len(record)))
-    monkeypatch.setattr(driven, "rest_of", lambda *_: nowhere)
+    monkeypatch.setattr(floors, "rest_of", lambda *_: nowhere)
     assert held < 0.9 * left()
 
 

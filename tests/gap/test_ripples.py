@@ -12,7 +12,7 @@ from coupled.gap.effects.seen import ripples
 from coupled.gap.signals.output import Output
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points
-from coupled.gap.thresholds import RIPPLES_TRIED
+from coupled.gap.thresholds import TRIES
 from coupled.rig.rig import Rig
 from tests.support.gaps import made, nominal_rig
 
@@ -45,7 +45,7 @@ def loader_of(folder: Path, period_m: float, seed: int) -> list[Output]:
 def test_a_ripple_is_seen_at_its_period(tmp_path: Path, period_m: float, seed: int) -> None:
     """Of 7 mm it was sought at 0.9 mm, where noise is most of the force that δc would need."""
     seen = ripples(loader_of(tmp_path, period_m, seed), rig_of(), "column")
-    assert 1 <= len(seen) <= RIPPLES_TRIED
+    assert 1 <= len(seen) <= TRIES
     assert seen[0]["period_{d}"] == pytest.approx(period_m, rel=0.05)
     assert 0.3 < seen[0]["ripple_N"] / RIPPLE["ripple_N"] < 1.3
 

@@ -6,12 +6,11 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import cast
 
-import pytest
-
 from coupled.cli.gaps import _write_improved, in_words
 from coupled.gap.findings.budget import Share, StageBudget, share_of
 from coupled.gap.findings.diagnosis import Diagnosis
-from coupled.record.record import Record
+from coupled.gap.findings.result import ParameterEstimate
+from coupled.rig.rigwrite import rig_text
 from tests.support.rigs import bench
 
 SUMMARY = "Play of 1 mm explains 60 % of the gap. Friction explains 30 %. Set q̄ first."
@@ -41,14 +40,14 @@ def test_a_share_is_one_number_wherever_it_is_written() -> None:
     assert share_of((budget,), "linkage", "play") == ""
 
 
-def test_a_key_that_is_no_effect_is_explained(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_key_that_is_no_effect_is_explained(tmp_path: Path) -> None:
     """A servo found on a rig without one: its damping ratio is written, and is no effect."""
     loader = "controls.column.loader"
     old = bench({"servo_frequency_Hz": 0.0})
     new = old.changed({f"{loader}.servo_frequency_Hz": 9.0, f"{loader}.servo_damping_ratio": 0.7})
-    found = SimpleNamespace(key="loader.servo_frequency_Hz", filed=None, found=9.0, unit="Hz")
+    found = ParameterEstimate(
+        "frequency_Hz", 9.0, 8.9, 9.1, key="loader.servo_frequency_Hz", unit="Hz", found=9.0
+    )
     whole = SimpleNamespace(
         summary="A servo.",
         effects=(SimpleNamespace(parameters=(found,), key_of=lambda p: p.key),),
@@ -56,12 +55,9 @@ def test_a_key_that_is_no_effect_is_explained(
         nominal=old,
         improved=new,
     )
-    monkeypatch.setattr("coupled.gap.findings.summary.change", lambda p: "none → 9 Hz")
-    monkeypatch.setattr("coupled.gap.trimmed.rig_of_manifests", lambda records: old)
-    monkeypatch.setattr("coupled.gap.trimmed.trimmed", lambda rig, records: (rig, ""))
-    target = tmp_path / "new.toml"
-    records: dict[str, Record] = {}
-    _write_improved(target, cast("Diagnosis", whole), None, records, with_curves=False)
+    filed, target = tmp_path / "old.toml", tmp_path / "new.toml"
+    filed.write_text(rig_text(old), encoding="utf-8")
+    _write_improved(target, cast("Diagnosis", whole), filed, {}, with_curves=False)
     head = [line for line in target.read_text(encoding="utf-8").splitlines() if line[:1] == "#"]
     assert (
         "# written beside these: controls.column.loader.servo_damping_ratio, since a file gives"

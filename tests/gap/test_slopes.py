@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.errors import InputError
-from coupled.gap.search.descent import Descent
-from coupled.gap.search.slopes import Slope, Slopes
+from coupled.gap.search.descent import Descent, Slope, Slopes
 from coupled.gap.stages.airframe import Flights
 from coupled.gap.stages.openloop import Flown
 
@@ -65,17 +64,17 @@ def test_a_fit_that_goes_on_from_another_takes_no_differences() -> None:
 def test_where_a_residual_that_jumps_has_moved_its_slopes_are_taken_anew() -> None:
     curved, x = Curved(), np.array([1.0, 1.0])
     wrong = Slope(x, curved(x), np.zeros((400, 2)))
-    kept = Slopes(curved, ENDS, slice(None), last=wrong)
+    kept = Slopes(curved, ENDS, last=wrong)
     assert not kept(x + 1e-4).any()  # hardly moved: as they were
     assert np.allclose(kept(x + 0.1), curved.jacobian(x + 0.1), atol=0.5)
     of_others = Slope(x, np.zeros(7), np.zeros((7, 2)))
-    assert Slopes(curved, ENDS, slice(None), last=of_others)(x).any()
+    assert Slopes(curved, ENDS, last=of_others)(x).any()
 
 
 def test_a_smooth_residual_that_goes_otherwise_than_its_slopes_say_is_asked_anew() -> None:
     curved, x = Curved(), np.array([1.0, 1.0])
     wrong = Slope(x, curved(x), np.zeros((400, 2)))
-    smooth = Slopes(curved, ENDS, slice(None), last=wrong, smooth=True)
+    smooth = Slopes(curved, ENDS, last=wrong, smooth=True)
     assert np.allclose(smooth(x + 0.1), curved.jacobian(x + 0.1), atol=0.5)
     assert smooth.corrections == 0
 

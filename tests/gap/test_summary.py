@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from coupled.gap.findings.budget import Share, StageBudget
+from coupled.gap.findings.budget import ChannelShrink, Share, Shrink, StageBudget
 from coupled.gap.findings.result import (
     EffectResult,
     Findings,
@@ -14,7 +14,6 @@ from coupled.gap.findings.result import (
     StageResult,
     Verdict,
 )
-from coupled.gap.findings.shrink import ChannelShrink, Shrink
 from coupled.gap.findings.summary import in_time, summary
 from coupled.gap.search.course import Bounds, Course
 

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from coupled.gap.diagnose import diagnose
-from coupled.gap.noise.noise import Noise
-from coupled.gap.noise.quiet import noise_of_input
+from coupled.gap.noise.noise import Noise, noise_of_input
 from coupled.record.record import Record
 from tests.support import gaps, records
 

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 
 from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import Manoeuvre, PressureProfile
 from coupled.flight.pilot import ForceTable
 from coupled.flight.runfile import read_run
+from coupled.gap import prepare
 from coupled.gap.effects.effect import Effect, apply
 from coupled.gap.effects.library import BY_NAME
 from coupled.gap.search.case import Case
@@ -32,6 +34,11 @@ def starts_of(case: Case, effect: Effect) -> list[dict[str, float]]:
     screen = Screen(problem, problem.variances(root.rig))
     found = screen.best(root, [effect], Worth(0.0, every))
     return [start for one in found for start in one.starts]
+
+
+def know_only(monkeypatch: pytest.MonkeyPatch, effects: Sequence[Effect]) -> None:
+    """Leave these effects in the library; any other is then one that the library lacks."""
+    monkeypatch.setattr(prepare, "library_of", lambda *_: list(effects))
 
 
 def pushes(seed: int, amplitude_N: float = 45.0) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

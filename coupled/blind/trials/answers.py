@@ -11,7 +11,7 @@ from coupled.blind.trials.readings import same_law
 from coupled.blind.trials.truth import Truth
 from coupled.errors import InputError
 from coupled.files import read_json
-from coupled.gap.findings.document import KeptEffect, diagnosis_from
+from coupled.gap.findings.result import KeptEffect, diagnosis_from
 
 NAMING = ("effect", "mostly")  # verdicts that name effects as certain
 MISSING = "missing"  # the verdict of a record without a diagnosis

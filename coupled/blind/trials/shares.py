@@ -16,7 +16,7 @@ import numpy as np
 from coupled.blind.trials.measure import outputs_of
 from coupled.gap.chain import BY_NAME as STAGE_OF
 from coupled.gap.effects.library import BY_NAME
-from coupled.gap.findings.shapley import shapley_weights
+from coupled.gap.findings.budget import shapley_weights
 from coupled.gap.signals.output import Output
 from coupled.record.record import Record
 from coupled.rig.rig import Rig

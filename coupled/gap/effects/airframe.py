@@ -7,8 +7,18 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from coupled.gap.effects.effect import TERMS, Drawing, Effect, Parameter, Sampled, Signature
-from coupled.gap.effects.entries import added, factor, one, value
+from coupled.gap.effects.effect import (
+    TERMS,
+    Drawing,
+    Effect,
+    Parameter,
+    Sampled,
+    Signature,
+    added,
+    factor,
+    one,
+    value,
+)
 from coupled.gap.signals.air import NEEDS as AIR
 from coupled.gap.signals.air import spread_of_air
 

@@ -1,4 +1,4 @@
-"""The entries of the library of effects, and how an effect changes a rig.
+"""The entries of the library of effects, their constructors, and how an effect changes a rig.
 
 An effect is added to a rig by changing values under keys of the rig file. The stages are then
 predicted with the changed rig.
@@ -7,7 +7,7 @@ predicted with the changed rig.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from math import hypot
 from typing import Any, Literal, NamedTuple
@@ -15,7 +15,7 @@ from typing import Any, Literal, NamedTuple
 from coupled.errors import InputError
 from coupled.gap.chain import BY_NAME as STAGE_OF
 from coupled.gap.signals.output import Floats, Output
-from coupled.gap.thresholds import MODEL_ERROR
+from coupled.gap.thresholds import LIGHT_LOAD_N, MODEL_ERROR
 from coupled.record.channels import ControlName, channel, unit_of
 from coupled.record.record import Record
 from coupled.rig.crossing import leaking
@@ -24,6 +24,28 @@ from coupled.schema import SMALLEST, Section, file_keys
 
 Mode = Literal["value", "factor", "added", "switch", "yields"]
 Drawing = Literal["law", "loop", "time"]
+Role = Literal["size", "other", "shape"]
+Kind = Literal["", "limit", "aliased", "saturating"]
+# The host has values of its own for these keys, which are then to be corrected.
+HOST_VALUES = {
+    "loader.bend_{d}_per_N": "K̂",
+    "loader.basic_gradient_N_per_{d}": "the host's G_B",
+    "loader.breakout_N": "the host's F_BO",
+}
+
+
+class ModelError(NamedTuple):
+    """The error of a value from the model of a right effect.
+
+    `relative` is relative to its size; `absolute`, in its unit, is the largest error from
+    conditions that the record does not show.
+    """
+
+    relative: float = MODEL_ERROR
+    absolute: float = 0.0
+
+
+USUAL = ModelError()
 
 
 @dataclass(frozen=True)
@@ -32,20 +54,18 @@ class Parameter:
 
     `key`          key of a control or of the flight; `{d}` in it and in the name is m or rad
     `mode`         `value` replaces the nominal value, `factor` multiplies it, `added` is added to
-                   it; `switch` sets the key to `on`; `yields` is the presliding length, which sets
-                   the stiffness of the contact
+                   it; a `switch` has no value (`Switch`); `yields` is the presliding length, which
+                   sets the stiffness of the contact
     `low`, `high`  bounds of the fit, `starts` its start values
     `above`        key whose nominal value is added to the starts
-    `scanned`      the screen varies it
-    `shape`        held at its start in the search for the least size that shows
-    `inverse`      a limit: a smaller value has a larger effect, and 0 is no limit
+    `role`         a `size` is varied by the screen; a `shape` is held at its start in the search
+                   for the least size that shows
+    `kind`         of a `limit` a smaller value has a larger effect, and 0 is no limit; an `aliased`
+                   frequency may lie on either side of half the frame rate; larger values of a
+                   `saturating` one make no difference, such as a play wider than the motion
     `may_end`      a fit at a bound is admissible
-    `host`         the name of the host's own value, which is then to be corrected
-    `folds`        a frequency, aliased about half of the frame rate
-    `saturates`    larger values make no difference, such as a play wider than the motion
     `tolerance`    half-width of its range as a nuisance parameter, relative for a factor
-    `model_error`  relative error of the value from the model of a right effect
-    `unsure`       largest error from conditions that the record does not show
+    `model_error`  error of the value from the model of a right effect
     """
 
     name: str
@@ -54,18 +74,27 @@ class Parameter:
     low: float = 0.0
     high: float = 0.0
     starts: tuple[float, ...] = (0.0,)
-    on: Any = None
     above: str = ""
-    scanned: bool = True
-    shape: bool = False
-    inverse: bool = False
+    role: Role = "size"
+    kind: Kind = ""
     may_end: bool = False
-    model_error: float = MODEL_ERROR
-    unsure: float = 0.0
-    host: str = ""
-    folds: bool = False
-    saturates: bool = False
+    model_error: ModelError = USUAL
     tolerance: float = 0.0
+
+    @property
+    def is_size(self) -> bool:
+        """Whether the value is a size of the effect, which the screen varies."""
+        return self.role == "size"
+
+    @property
+    def is_limit(self) -> bool:
+        """Whether a smaller value has a larger effect."""
+        return self.kind == "limit"
+
+    @property
+    def host(self) -> str:
+        """The name of the host's own value, which is then to be corrected; empty without one."""
+        return HOST_VALUES.get(self.key, "")
 
     def named(self, control: str) -> str:
         """Return the parameter's name with its unit on a control."""
@@ -95,8 +124,6 @@ class Parameter:
 
     def entered(self, nominal: Any, value: float) -> Any:
         """Return the rig's new value for a fitted value."""
-        if self.mode == "switch":
-            return self.on
         if self.mode == "factor":
             return nominal * value
         if self.mode == "added":
@@ -113,16 +140,27 @@ class Parameter:
         return self.low, self.high
 
     def error(self, value: float, rig: Rig, control: ControlName) -> float:
-        """Return the smallest standard error of a value, from the model error and `unsure`."""
+        """Return the smallest standard error of a value, from its model error."""
         none = self.base(rig, control) if self.above else self.neutral(rig, control)
-        size = abs(value) if self.inverse else abs(value - none)
-        return hypot(self.model_error * size, self.unsure)
+        size = abs(value) if self.is_limit else abs(value - none)
+        return hypot(self.model_error.relative * size, self.model_error.absolute)
 
     def neutral(self, rig: Rig, control: ControlName) -> float:
         """Return the value that leaves the rig's value unchanged."""
         if self.mode == "value":
             return float(self.nominal(rig, control))
         return 1.0 if self.mode == "factor" else 0.0
+
+
+@dataclass(frozen=True)
+class Switch(Parameter):
+    """A parameter without a value, which sets its key to `on`."""
+
+    on: Any = None
+
+    def entered(self, nominal: Any, value: float) -> Any:
+        """Return the value that is set."""
+        return self.on
 
 
 @dataclass(frozen=True)
@@ -311,7 +349,7 @@ def dotted(key: str, control: str) -> str:
 
 FRICTION, BREAKAWAY = "loader.friction_N", "loader.breakaway_N"
 DIRECTIONS = ("loader.friction_pull_N", "loader.friction_push_N")
-BY_LOAD, LIGHT_LOAD_N = "loader.friction_by_load", 10.0
+BY_LOAD = "loader.friction_by_load"
 
 
 def _level(rig: Rig, control: ControlName, changes: Mapping[str, Any]) -> float:
@@ -338,3 +376,74 @@ def _breakaway(rig: Rig, control: ControlName, changes: Mapping[str, Any]) -> di
     if filed == 0.0:
         return {}
     return {BREAKAWAY: float(changes[FRICTION]) + max(filed - running, 0.0)}
+
+
+# A potentiometer is set, and a servo tuned, to 1 or 2 %: within this tolerance the value is a
+# nuisance parameter, and no effect.
+
+
+def factor(key: str, start: float, low: float = 0.1, high: float = 10.0) -> Parameter:
+    """Return a factor on the rig's value."""
+    return Parameter("factor", key, "factor", low, high, (start,))
+
+
+def added(name: str, key: str, low: float, high: float, *starts: float) -> Parameter:
+    """Return a parameter that is added to the rig's value."""
+    return Parameter(name, key, "added", low, high, starts)
+
+
+def value(name: str, key: str, low: float, high: float, *starts: float) -> Parameter:
+    """Return a parameter that replaces the rig's value."""
+    return Parameter(name, key, "value", low, high, starts)
+
+
+def limit(name: str, key: str, low: float, high: float, *starts: float) -> Parameter:
+    """Return a limit: a smaller value has a larger effect."""
+    return replace(value(name, key, low, high, *starts), kind="limit")
+
+
+def exact(parameter: Parameter) -> Parameter:
+    """Return a parameter that is no size, without model error."""
+    return replace(parameter, role="other", model_error=ModelError(0.0))
+
+
+def real_bend(start: float) -> Parameter:
+    """Return the actual bend coefficient K."""
+    number = value("bend_{d}_per_N", "loader.bend_{d}_per_N", 0, 1e-2, start)
+    return replace(number, role="other")
+
+
+def bend_beside(start: float) -> Parameter:
+    """Return the actual bend coefficient K of another effect; it starts at the nominal value."""
+    return replace(real_bend(start), above="loader.bend_{d}_per_N")
+
+
+def switch(key: str, on: Any) -> Switch:
+    """Return a parameter without a value, which sets a key."""
+    return Switch("", key, "switch", on=on)
+
+
+def one(
+    stage: str,
+    name: str,
+    parameter: Parameter,
+    x: str,
+    y: str,
+    drawing: Drawing = "law",
+    zoom_s: float = 2.5,
+) -> Effect:
+    """Return an effect of one parameter, drawn as y against x."""
+    return Effect(name, stage, (parameter,), Signature(x, y, drawing, zoom_s))
+
+
+def setting_of(
+    effect: Effect, low: float, high: float, neutral: float = 1.0, every_output: bool = False
+) -> Effect:
+    """Return an effect's parameter as a nuisance parameter between two values.
+
+    It is fitted to the first output in which the effect shows, or to all of them if `every_output`.
+    """
+    (number,) = effect.parameters
+    within = replace(number, low=low, high=high, starts=(neutral,), tolerance=0.0)
+    name, shown = f"setting of {effect.name}", effect.shows_in[: None if every_output else 1]
+    return replace(effect, name=name, parameters=(within,), outputs=shown)

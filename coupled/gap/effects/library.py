@@ -10,8 +10,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from coupled.gap.effects.airframe import AIRFRAME
-from coupled.gap.effects.effect import Effect
-from coupled.gap.effects.entries import added, factor, limit, one, setting_of, value
+from coupled.gap.effects.effect import Effect, added, factor, limit, one, setting_of, value
 from coupled.gap.effects.linkage import LINKAGE, without_servo
 from coupled.gap.effects.loader import LOADER
 from coupled.gap.effects.sensing import COMPENSATION, SENSING
@@ -68,7 +67,7 @@ EFFECTS: tuple[Effect, ...] = (
     one(
         "surface",
         "surface_freeplay",
-        replace(added("play_norm", "rigging.play_norm", 0, 0.5, 0.01), saturates=True),
+        replace(added("play_norm", "rigging.play_norm", 0, 0.5, 0.01), kind="saturating"),
         *("wanted", "answer_left", "loop"),
     ),
     *AIRFRAME,

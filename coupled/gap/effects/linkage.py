@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from coupled.gap.effects.effect import Effect, Signature
-from coupled.gap.effects.entries import (
-    SETTING,
+from coupled.gap.effects.effect import (
+    Effect,
+    Signature,
     added,
     bend_beside,
     factor,
@@ -17,12 +17,13 @@ from coupled.gap.effects.entries import (
     switch,
     value,
 )
+from coupled.gap.thresholds import SETTING
 
 SERVO = "loader.servo_frequency_Hz"
 DAMPING_RATIO = replace(
     factor("loader.servo_damping_ratio", 1.0),
     name="damping_factor",
-    scanned=False,
+    role="other",
     may_end=True,
 )
 LINKAGE: tuple[Effect, ...] = (
@@ -50,8 +51,7 @@ LINKAGE: tuple[Effect, ...] = (
                     *("stiffness_N_per_{d}", "loader.play_stiffness_N_per_{d}"),
                     *(1e3, 1e8, 5e5, 1e5, 2e4),
                 ),
-                scanned=False,
-                shape=True,
+                role="shape",
             ),
         ),
         Signature("force", "deflection_left", "loop"),
@@ -64,11 +64,11 @@ LINKAGE: tuple[Effect, ...] = (
             bend_beside(1e-6),
             replace(
                 value("share", "loader.bend_hysteresis_share", 0, 0.98, 0.3),
-                scanned=False,
+                role="other",
             ),
             replace(
                 value("width_N", "loader.bend_hysteresis_width_N", 0, 500, 5.0, 1.0, 25.0),
-                scanned=False,
+                role="other",
             ),
         ),
         Signature("force", "bent", "loop", 6.0),
@@ -82,7 +82,7 @@ LINKAGE: tuple[Effect, ...] = (
             limit("frequency_Hz", "loader.bend_frequency_Hz", 0.5, 200, 8.0),
             replace(
                 value("damping_ratio", "loader.bend_damping_ratio", 0, 2, 0.05),
-                scanned=False,
+                role="other",
                 may_end=True,
             ),
         ),
@@ -128,7 +128,7 @@ LINKAGE: tuple[Effect, ...] = (
                 replace(
                     factor(SERVO, 1.0),
                     starts=(1.0, 3.0, 8.0),
-                    scanned=False,
+                    role="other",
                     may_end=True,
                 ),
                 *more,

@@ -1,15 +1,101 @@
-"""The loader's effects in the library."""
+"""The loader's effects in the library, and the laws of its dry friction.
+
+All laws of dry friction have a running level. They differ in the force near zero speed.
+"""
 
 from __future__ import annotations
 
 import math
 from dataclasses import replace
 
-from coupled.gap.effects.effect import OTHER_FORCE, Effect, Parameter, Signature
-from coupled.gap.effects.entries import SETTING, added, factor, limit, one, switch, value
-from coupled.gap.effects.frictions import FRICTIONS
+from coupled.gap.effects.effect import (
+    OTHER_FORCE,
+    Effect,
+    ModelError,
+    Parameter,
+    Signature,
+    added,
+    factor,
+    limit,
+    one,
+    switch,
+    value,
+)
 from coupled.gap.effects.seen import ripples, stops
-from coupled.gap.thresholds import CLOCK_s
+from coupled.gap.thresholds import SETTING, YIELDING_ERROR, CLOCK_s
+
+_DRAWN = Signature("speed", "missing")
+
+
+def _level(*starts_N: float) -> Parameter:
+    """Return the running friction above the nominal one."""
+    return Parameter("friction_N", "loader.friction_N", "added", 0, 60, starts_N)
+
+
+_BREAKAWAY = Parameter("breakaway_N", "loader.breakaway_N", "value", 0, 200, (2.0, 3.0, 3.0))
+_FADING = Parameter(
+    "stribeck_{d}_per_s", "loader.stribeck_rate_{d}_per_s", "value", 2e-4, 0.05, (2e-3,)
+)
+_CONTACT = Parameter(
+    *("stiffness_N_per_{d}", "loader.friction_stiffness_N_per_{d}", "value", 1e2, 1e8, (1e4, 1e5)),
+    model_error=ModelError(YIELDING_ERROR),
+)
+
+
+_ELASTIC = Parameter(
+    *("elastic_share", "loader.friction_elastic_share", "value", 0, 0.98, (0.3,)),
+    role="shape",
+    may_end=True,
+    model_error=ModelError(YIELDING_ERROR),
+)
+
+
+def _one_way(name: str, *starts_N: float) -> Parameter:
+    """Return the friction in one direction of motion above the nominal one."""
+    number = Parameter(name, f"loader.friction_{name}", "added", 0, 60, starts_N)
+    return replace(number, may_end=True)
+
+
+FRICTIONS: tuple[Effect, ...] = (
+    Effect("coulomb_friction", "loader", (_level(1.5),), _DRAWN, dry=True),
+    Effect(
+        "stribeck_friction",
+        "loader",
+        (
+            _level(1.0, 0.3, 0.1),
+            replace(_BREAKAWAY, above="loader.friction_N"),
+            replace(_FADING, role="shape"),
+        ),
+        _DRAWN,
+        dry=True,
+        contains=("coulomb_friction", "presliding_friction"),
+    ),
+    Effect(
+        "presliding_friction",
+        "loader",
+        (_level(1.5), replace(_CONTACT, role="shape", kind="limit"), _ELASTIC),
+        _DRAWN,
+        dry=True,
+        contains=("coulomb_friction",),
+    ),
+    # Equivalent to Coulomb friction of the mean level with a constant force of half the difference.
+    Effect(
+        "asymmetric_friction",
+        "loader",
+        (_one_way("pull_N", 1.5, 0.5), _one_way("push_N", 0.5, 1.5)),
+        _DRAWN,
+        dry=True,
+        contains=("coulomb_friction",),
+    ),
+    Effect(
+        "load_friction",
+        "loader",
+        (Parameter("factor", "loader.friction_by_load", "added", 0, 0.8, (0.03,)),),
+        Signature("force", "missing"),
+        dry=True,
+    ),
+)
+
 
 QUARTERS_rad = tuple(0.5 * math.pi * k for k in range(-1, 3))  # hanging, level, upright
 
@@ -37,7 +123,7 @@ LOADER: tuple[Effect, ...] = (
     one(
         "loader",
         "gradient_error",
-        replace(factor("loader.basic_gradient_N_per_{d}", 1.05), host="the host's G_B"),
+        factor("loader.basic_gradient_N_per_{d}", 1.05),
         *("computed", "missing"),
     ),
     one(
@@ -49,7 +135,7 @@ LOADER: tuple[Effect, ...] = (
     one(
         "loader",
         "breakout",
-        replace(added("breakout_N", "loader.breakout_N", 0, 60, 2.0), host="the host's F_BO"),
+        added("breakout_N", "loader.breakout_N", 0, 60, 2.0),
         *("computed", "missing"),
     ),
     one(
@@ -76,7 +162,10 @@ LOADER: tuple[Effect, ...] = (
     one(
         "loader",
         "transport_delay",
-        replace(added("delay_s", "loader.delay_s", 0, 0.19, 0.01), unsure=CLOCK_s),
+        replace(
+            added("delay_s", "loader.delay_s", 0, 0.19, 0.01),
+            model_error=ModelError(absolute=CLOCK_s),
+        ),
         *("speed", "computed_left", "law", 1.0),
     ),
     Effect(
@@ -84,10 +173,8 @@ LOADER: tuple[Effect, ...] = (
         "loader",
         (
             added("ripple_N", "loader.ripple_N", 0, 60, 1.0),
-            replace(
-                value("period_{d}", "loader.ripple_period_{d}", 2e-4, 0.5, 1e-2), scanned=False
-            ),
-            replace(value("phase_rad", "loader.ripple_phase_rad", -7, 7, 1.0), scanned=False),
+            replace(value("period_{d}", "loader.ripple_period_{d}", 2e-4, 0.5, 1e-2), role="other"),
+            replace(value("phase_rad", "loader.ripple_phase_rad", -7, 7, 1.0), role="other"),
         ),
         Signature("computed", "missing"),
         seen=ripples,
@@ -99,8 +186,7 @@ LOADER: tuple[Effect, ...] = (
             added("gravity_N", "loader.gravity_N", 0, 60, 1.0),
             replace(
                 value("angle_rad", "loader.gravity_angle_rad", -7, 7, *QUARTERS_rad),
-                scanned=False,
-                shape=True,
+                role="shape",
             ),
         ),
         Signature("computed", "missing"),
@@ -112,8 +198,7 @@ LOADER: tuple[Effect, ...] = (
             added("stiffness_N_per_{d}", "loader.relaxing_stiffness_N_per_{d}", 0, 1e5, 200.0),
             replace(
                 value("time_s", "loader.relaxing_time_s", 5e-3, 100, 0.2, 1.5),
-                scanned=False,
-                shape=True,
+                role="shape",
             ),
         ),
         Signature("speed", "missing", "loop", 6.0),

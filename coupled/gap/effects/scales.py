@@ -106,7 +106,7 @@ def _scaled(p: Parameter, scales: Scales, rig: Rig, control: ControlName) -> Par
         return p
     times, size = scales.times_columns(unit, control), scales.size(unit)
     low, high = times * p.low, times * p.high
-    if unit == "N" and size is not None and not p.inverse:
+    if unit == "N" and size is not None and not p.is_limit:
         high = max(high, BOUND_SCALES * size)
         low = min(low, -BOUND_SCALES * size) if low < 0.0 else low
     if (low, high, times) == (p.low, p.high, 1.0):

@@ -18,13 +18,7 @@ from numpy.typing import NDArray
 from coupled.gap.noise.lines import lines_in, tone_of
 from coupled.gap.noise.smooth import smoothed
 from coupled.gap.signals.output import Floats, Output
-from coupled.gap.thresholds import (
-    RIPPLE_LEAST,
-    RIPPLE_PERIODS,
-    RIPPLES_TRIED,
-    STOP_PASSED,
-    HUM_FROM_Hz,
-)
+from coupled.gap.thresholds import FEW, MORE, RIPPLE_PERIODS, TRIES, HUM_FROM_Hz
 from coupled.record.channels import ControlName, channel
 from coupled.rig.rig import Rig
 
@@ -34,7 +28,7 @@ Complex = NDArray[np.complex128]
 def hums(outputs: Sequence[Output], rig: Rig, control: ControlName) -> list[dict[str, float]]:
     """Return amplitude, d, frequency, Hz, and phase, rad, of the strongest hum, if there is one.
 
-    Only the first record is used: the phase differs between records (`sensed`).
+    Only the first record is used: the phase differs between records (`reading`).
     """
     ours = [output for output in outputs if output.stage == "loader"]
     if not ours:
@@ -78,7 +72,7 @@ def ripples(outputs: Sequence[Output], rig: Rig, control: ControlName) -> list[d
     left = np.concatenate([output.residual(rig) * output.floor for output in ours])
     left = left - smooth @ (smooth.T @ left)
     span = max(float(np.ptp(way)) for way in ways)
-    periods = span / np.arange(RIPPLE_LEAST, RIPPLE_PERIODS, 0.25)
+    periods = span / np.arange(MORE, RIPPLE_PERIODS, 0.25)
     waves = []
     for period in periods.tolist():
         turned = moved([np.exp(2j * np.pi * way / period) for way in ways])
@@ -86,7 +80,7 @@ def ripples(outputs: Sequence[Output], rig: Rig, control: ControlName) -> list[d
         waves.append(_wave(both - smooth @ (smooth.T @ both), left, period))
     taken = np.array([0.0, *(wave.taken for wave in waves), 0.0])
     peaks = np.flatnonzero((taken[1:-1] > taken[:-2]) & (taken[1:-1] >= taken[2:]))
-    best = sorted(peaks.tolist(), key=lambda k: -waves[k].taken)[:RIPPLES_TRIED]
+    best = sorted(peaks.tolist(), key=lambda k: -waves[k].taken)[:TRIES]
     return [waves[k].values for k in best]
 
 
@@ -140,7 +134,7 @@ def _met(output: Output, rig: Rig, side: float) -> float | None:
     measured = side * output.measured
     predicted = measured - side * output.residual(rig) * output.floor
     furthest = float(np.max(measured))
-    held = predicted > furthest + STOP_PASSED * float(np.ptp(measured))
+    held = predicted > furthest + FEW * float(np.ptp(measured))
     if furthest <= 0.0 or not held.any():
         return None
     return max(float(np.median(measured[held])), 0.0) or None

@@ -4,8 +4,18 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from coupled.gap.effects.effect import Effect, Parameter, Sampled, Signature
-from coupled.gap.effects.entries import added, exact, factor, one, value
+from coupled.gap.effects.effect import (
+    Effect,
+    ModelError,
+    Parameter,
+    Sampled,
+    Signature,
+    added,
+    exact,
+    factor,
+    one,
+    value,
+)
 from coupled.gap.effects.seen import hums
 from coupled.gap.signals.missed import shares_missed, spread_of_missed, times_missed
 from coupled.gap.thresholds import CLOCK_s
@@ -21,7 +31,10 @@ COMPENSATION: tuple[Effect, ...] = (
         one(
             "compensation",
             "dropped_frames",
-            replace(added("share", "compensation.missed_share", 0, 0.9, 0.3), model_error=0.0),
+            replace(
+                added("share", "compensation.missed_share", 0, 0.9, 0.3),
+                model_error=ModelError(0.0),
+            ),
             *("", "estimate_left", "time", 0.5),
         ),
         outputs=("schedule", "multiplier", "compensation"),
@@ -74,7 +87,8 @@ SENSING: tuple[Effect, ...] = (
             added("amplitude_{d}", "sensing.hum_{d}", 0, 0.1, 1e-4),
             # The start sets the scale of difference steps, 0.1 Hz.
             replace(
-                exact(value("frequency_Hz", "sensing.hum_frequency_Hz", 5, 1000, 0.1)), folds=True
+                exact(value("frequency_Hz", "sensing.hum_frequency_Hz", 5, 1000, 0.1)),
+                kind="aliased",
             ),
             exact(value("phase_rad", "sensing.hum_phase_rad", -7, 7, 1.0)),
         ),

@@ -9,16 +9,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from coupled.gap.effects.effect import Effect, Parameter, Signature
-from coupled.gap.effects.entries import setting_of
+from coupled.gap.effects.effect import Effect, Parameter, Signature, setting_of
 from coupled.gap.effects.library import BY_NAME, EFFECTS, LAG
 from coupled.gap.signals.output import Output
-from coupled.gap.thresholds import YIELDS_m, YIELDS_rad
+from coupled.gap.thresholds import MOST_ELASTIC, WHEEL_m, YIELDS_m
 from coupled.record.channels import ControlName, unit_of
 from coupled.rig.rig import Rig
 
 CONTACT = ("loader.friction_stiffness_N_per_{d}", "loader.friction_elastic_share")
-MOST_ELASTIC = 0.95
 
 
 def settings(rig: Rig, control: ControlName, outputs: Sequence[Output] = ()) -> dict[str, Effect]:
@@ -83,7 +81,7 @@ def contact(rig: Rig, control: ControlName) -> tuple[Effect, ...]:
 
 def most_yielding(control: ControlName) -> float:
     """Return the largest presliding length, d."""
-    return YIELDS_rad if unit_of(control) == "rad" else YIELDS_m
+    return (YIELDS_m / WHEEL_m) if unit_of(control) == "rad" else YIELDS_m
 
 
 def is_dry(rig: Rig, control: ControlName) -> bool:

@@ -25,16 +25,7 @@ from coupled.gap.search.found import Choice, Found
 from coupled.gap.search.histories import course_in
 from coupled.gap.signals.output import Output
 from coupled.gap.stages.stages import Reader
-from coupled.gap.thresholds import (
-    CERTAIN,
-    DOUBT,
-    LIKELY,
-    MOST,
-    STATED_MOST,
-    SURE,
-    UNDERSTATED,
-    UNDETERMINED_MOST,
-)
+from coupled.gap.thresholds import CERTAIN, DOUBT, MOST, NEGLIGIBLE, STATED_MOST, SURE, UNDERSTATED
 from coupled.record.channels import ControlName, unit_of
 from coupled.rig.rig import Rig
 
@@ -69,7 +60,7 @@ def verdict_of(
         # A stage within a large noise floor may hide a gap.
         return "ambiguous" if any(stage.hidden is not None for stage in stages) else "no_gap"
     rivals = {step.effect.name for step in choice.steps if step.rivals}
-    open_rivals = rivals - sure if choice.probability > LIKELY else rivals
+    open_rivals = rivals - sure if choice.probability > MOST else rivals
     if open_rivals and not (held and sure and rivals <= incredible(choice, effects)):
         return "ambiguous"
     return "mostly" if left or open_rivals else "effect"
@@ -152,7 +143,7 @@ def effects_of(
         sure = DOUBT + (SURE - DOUBT) * known.value
         scatter = _sample_error(effect, readers)
         numbers = tuple(_estimate(choice, effect, p, case, scatter) for p in effect.free)
-        most = STATED_MOST if has_size(effect, case, numbers) else UNDETERMINED_MOST
+        most = STATED_MOST if has_size(effect, case, numbers) else (CERTAIN - NEGLIGIBLE)
         probability = min(step.probability * sure, most)
         course = course_in(effect, case, choice.fit, records)
         given = (effect.name, effect.stage, probability, numbers, known, course)
@@ -163,10 +154,10 @@ def effects_of(
 
 def has_size(effect: Effect, case: Case, numbers: Sequence[ParameterEstimate]) -> bool:
     """Tell whether a size of an effect differs from its neutral value; a limit always does."""
-    sizes = [(p, one) for p, one in zip(effect.free, numbers, strict=True) if p.scanned]
+    sizes = [(p, one) for p, one in zip(effect.free, numbers, strict=True) if p.is_size]
     for p, one in sizes:
         none, low, high = p.neutral(case.nominal, case.control), one.low, one.high
-        if p.inverse or not (low is None or low <= none) or not (high is None or none <= high):
+        if p.is_limit or not (low is None or low <= none) or not (high is None or none <= high):
             return True
     return not sizes
 
@@ -182,7 +173,7 @@ def _estimate(
     if scatter > 0.0:  # sampling error of a random quantity
         low = max(value - math.hypot(value - low, 1.96 * scatter * value), p.low)
         high = value + math.hypot(high - value, 1.96 * scatter * value)
-    twin = other_side(value, case.nominal.frame_rate) if p.folds else None
+    twin = other_side(value, case.nominal.frame_rate) if p.kind == "aliased" else None
     if twin is not None:  # aliased: the tone may lie on either side of the Nyquist frequency
         low, high = min(low, twin - (value - low)), max(high, twin + (high - value))
     ends = (low if math.isfinite(low) else None, high if math.isfinite(high) else None)
@@ -197,7 +188,7 @@ def _estimate(
         high=ends[1],
         key=p.key_on(case.control),
         unit=p.unit(case.nominal, case.control),
-        filed=None if p.inverse and filed == 0.0 else filed,
+        filed=None if p.is_limit and filed == 0.0 else filed,
         found=float(p.entered(filed, value)),
         found_low=bounds[0],
         found_high=bounds[1],

@@ -33,13 +33,7 @@ from scipy.special import nctdtrinc, stdtrit
 from coupled.display import unit_in
 from coupled.gap.noise.smooth import rate_of, smoothed
 from coupled.gap.signals.output import Output
-from coupled.gap.thresholds import (
-    CHANGE_BIN,
-    CHANGE_CHANCE,
-    CHANGE_SHOWN,
-    CHANGE_STILL,
-    FLOOR_SHARE,
-)
+from coupled.gap.thresholds import CHANGE_CHANCE, FEW, NEARLY_ALL, ROUNDING_SPAN, SMALL
 from coupled.record.channels import ControlName, channel
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
@@ -47,7 +41,6 @@ from coupled.rig.rig import Rig
 Floats = NDArray[np.float64]
 SIDES = ((1, "positive"), (-1, "negative"))
 FIRST = tuple(f"mean in {direction} direction" for _, direction in SIDES)
-LEAST_SCATTER = 1e-6  # of a signal's rms: of records that repeat to the last digit
 
 
 @dataclass(frozen=True)
@@ -80,7 +73,7 @@ class Interval:
         scatter = max(float(np.std(well, ddof=1)), least)
         error = scatter * math.sqrt(1.0 / m + 1.0 / n)
         times = float(stdtrit(n - 1, 1.0 - 0.5 * chance))
-        noncentral = float(nctdtrinc(n - 1, 1.0 - CHANGE_SHOWN, times))
+        noncentral = float(nctdtrinc(n - 1, 1.0 - NEARLY_ALL, times))
         shown = noncentral * error + unsure if math.isfinite(noncentral) else math.inf
         return cls(difference, scatter, times * error + unsure, shown)
 
@@ -159,7 +152,7 @@ class Comparison:
     @property
     def blind(self) -> frozenset[str]:
         """The stages in which a change of a tenth of the signal would not have been shown."""
-        return frozenset(stage for stage, size in self.shown.items() if size > FLOOR_SHARE)
+        return frozenset(stage for stage, size in self.shown.items() if size > SMALL)
 
     @property
     def words(self) -> str:
@@ -242,7 +235,7 @@ def compare(
             mean = feature.startswith("mean")
             own = size if mean else 1.0
             more = 2.0 * (excess * own if mean else math.log1p(excess))
-            interval = Interval.of(*values, chance, more, LEAST_SCATTER * own)
+            interval = Interval.of(*values, chance, more, ROUNDING_SPAN * own)
             found.append(Change(stage, name, feature, interval))
             if mean and channel_rms > 0.0:
                 shown[stage] = min(shown.get(stage, math.inf), interval.shown / channel_rms)
@@ -281,7 +274,7 @@ def _features(well: Signals, now: Signals, name: str) -> dict[str, tuple[Floats,
     """Return a signal's features: of each healthy record, and of each tested one."""
     pooled = [one[name].moved for one in well]
     rates = np.abs(np.concatenate([one.speed for one in pooled]))
-    still = CHANGE_STILL * float(np.sqrt(np.mean(rates**2)))
+    still = SMALL * float(np.sqrt(np.mean(rates**2)))
     fast = float(np.median(rates[rates > still])) if (rates > still).any() else still
     middle = float(np.median(np.concatenate([one.place for one in pooled])))
     each = [[_condensed(one[name], still, fast, middle) for one in ours] for ours in (well, now)]
@@ -294,7 +287,7 @@ def _condensed(signal: _Signal, still: float, fast: float, middle: float) -> dic
     """Return the features of one signal; `still`, `fast` in d/s and `middle` in d part its bins."""
     values, speed, high = signal.values, signal.moved.speed, signal.moved.place > middle
     rates, found = np.abs(speed), dict[str, float]()
-    least = max(3, round(CHANGE_BIN * len(values)))
+    least = max(3, round(FEW * len(values)))
     rough = np.abs(np.diff(values, 2, prepend=values[:2]))
     for side, direction in SIDES:
         moving = (side * speed > 0.0) & (rates > still)

@@ -3,8 +3,9 @@
 1. Stationarity. A cause has the same size in all regimes; an imitation has not (invariant causal
    prediction: Peters, Bühlmann and Meinshausen, J. R. Statist. Soc. B 78, 2016). The size is
    estimated in halves of the records by force, rate, direction, q̄ and time, and in each record.
-   Each half holds half of the power of the effect's contribution to the residual.
-2. Comparison with a nonparametric model of the stage's own signals (`flexible`), if a residual
+   Each half holds half of the power of the effect's contribution to the residual. The size is
+   relative to that in all records; its standard error is from the scatter between stretches.
+2. Comparison with a nonparametric model of the stage's own signals (`where`), if a residual
    remains. `beside_flexible` is the share of the model's residual that adding the effect removes.
    If the model can represent the effect, this share is small for correct and wrong effects alike.
    Then `against_flexible` decides: a correct effect, with one parameter, leaves no more than the
@@ -23,24 +24,164 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from scipy.special import ndtr
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtr, stdtr, stdtrit
 
 from coupled.gap.effects.effect import Effect, Parameter, Signature, touched, value_of
-from coupled.gap.findings.flexible import free_share
-from coupled.gap.findings.regimes import Acts, Regime, regimes
-from coupled.gap.findings.where import response, signals
+from coupled.gap.findings.where import free_share, response, signals
+from coupled.gap.noise.smooth import smoothed
 from coupled.gap.search.case import Case
 from coupled.gap.search.found import Fit
+from coupled.gap.signals.output import Output
 from coupled.gap.thresholds import (
     DRIFT,
     DRIFT_CHANCE,
-    FLEXIBLE_LEFT,
+    FEW,
     HOST_DRIFT,
-    LEAST_REMAINDER,
-    REMAINDER,
-    UNPROVEN,
+    LEAST_STRETCHES,
+    PARTLY,
+    SMALL,
 )
 from coupled.record.record import Record
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Regime:
+    """An effect's size in two halves of the records, relative to its size in all, with errors.
+
+    `by` is the signal that divides the records, `low` the half in which it is smaller. `freedom`
+    is the number of degrees of freedom of the errors.
+    """
+
+    by: str
+    low: float
+    high: float
+    low_error: float
+    high_error: float
+    freedom: float
+
+    def apart(self, chance: float) -> float:
+        """Return the difference of the sizes beyond that which has the probability `chance`.
+
+        The difference expected by chance is subtracted in squares.
+        """
+        error = math.hypot(self.low_error, self.high_error)
+        errors = float(stdtrit(self.freedom, 1.0 - min(chance, 1.0) / 2.0))
+        return math.sqrt(max((self.high - self.low) ** 2 - (errors * error) ** 2, 0.0))
+
+    @property
+    def p_value(self) -> float:
+        """The p-value of the difference if the sizes are equal (two-sided t test)."""
+        error = math.hypot(self.low_error, self.high_error)
+        if error == 0.0:
+            return 1.0
+        away = abs(self.high - self.low) / error
+        return float(2.0 * stdtr(self.freedom, -away))
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the JSON."""
+        sizes = {"low": self.low, "high": self.high}
+        errors = {"low_error": self.low_error, "high_error": self.high_error}
+        return {"by": self.by, **sizes, **errors, "p": self.p_value}
+
+
+@dataclass(frozen=True)
+class Acts:
+    """An effect's contribution to one output and the residual with all effects, in floors."""
+
+    output: Output
+    record: Record
+    action: Floats
+    left: Floats
+
+
+def regimes(case: Case, acts: Sequence[Acts]) -> tuple[Regime, ...]:
+    """Return the sizes in halves by every signal that divides the effect's contribution."""
+    by: dict[str, list[tuple[Acts, Floats]]] = {}
+    for one in acts:
+        for name, signal in _dividing(case, one).items():
+            by.setdefault(name, []).append((one, signal))
+    if len({one.output.record for one in acts}) > 1:
+        by["record"] = [(one, np.full(len(one.left), float(one.output.record))) for one in acts]
+    # If the floor is a model error, it may have one sign throughout a half.
+    lasting = 1.0 if case.model_error_in_floors else 0.0
+    found = (_regime(name, parts, lasting) for name, parts in by.items())
+    return tuple(one for one in found if one is not None)
+
+
+def _dividing(case: Case, one: Acts) -> dict[str, Floats]:
+    """Return the signals by which an output's frames are divided into halves."""
+    found = dict[str, Floats]()
+    for name, signal in signals(one.output, one.left, one.record, case.control).items():
+        if name.endswith("sign"):
+            if "rate" in name:
+                found[name] = signal
+        elif name == "time_s" or "pressure" in name:
+            found[name] = signal
+            if "rate" in name:  # separates hysteresis, independent of the rate, from a lag
+                found[f"size of {name}"] = np.abs(signal)
+        elif "cubed" not in name:
+            found[f"size of {name}"] = np.abs(signal - float(np.median(signal)))
+    pressure = "dynamic_pressure_Pa"
+    if pressure in one.record:
+        found[pressure] = smoothed(one.record[pressure])
+    return {name: signal for name, signal in found.items() if np.ptp(signal) > 0.0}
+
+
+def _regime(by: str, parts: Sequence[tuple[Acts, Floats]], lasting: float) -> Regime | None:
+    """Return the sizes in two halves with equal power of the contribution; None if impossible.
+
+    `lasting` is the rms of an error that may be constant in a half, in floors.
+    """
+    signal = np.concatenate([signal for _, signal in parts])
+    action = np.concatenate([one.action for one, _ in parts])
+    left = np.concatenate([one.left for one, _ in parts])
+    number = np.concatenate([1000 * one.output.record + one.output.stretches for one, _ in parts])
+    power = action**2
+    total = float(power.sum())
+    if total <= 0.0:
+        return None
+    order = np.argsort(signal, kind="stable")
+    reached = np.cumsum(power[order]) / total
+    middle = float(signal[order][int(np.searchsorted(reached, 0.5))])
+    low = signal < 0.0 if by.endswith("sign") else signal < middle
+    high = signal > 0.0 if by.endswith("sign") else signal >= middle
+    if min(float(power[low].sum()), float(power[high].sum())) < SMALL * total:
+        return None
+    sizes = [_size(action[rows], left[rows], number[rows], lasting) for rows in (low, high)]
+    (a, a_error, a_held), (b, b_error, b_held) = sizes
+    if min(a_held, b_held) < LEAST_STRETCHES:
+        return None
+    squares = (a_error**2, b_error**2)
+    apart = squares[0] ** 2 / (a_held - 1.0) + squares[1] ** 2 / (b_held - 1.0)
+    freedom = sum(squares) ** 2 / apart if apart > 0.0 else math.inf  # Welch
+    return Regime(by, 1.0 + a, 1.0 + b, a_error, b_error, freedom)
+
+
+def _size(
+    action: Floats, left: Floats, number: NDArray[np.intp], lasting: float = 0.0
+) -> tuple[float, float, float]:
+    """Return the relative error of an action in a residual, its standard error and sample size.
+
+    The standard error is from a jackknife over stretches, plus a `lasting` error of the residual,
+    rms, in proportion to the action. The sample size is the effective number of stretches with
+    the action (Kish): two, if a limit is reached in two stretches only.
+    """
+    power = float(action @ action)
+    more = float(left @ action) / power
+    names, at = np.unique(number, return_inverse=True)
+    scores, held = np.zeros(len(names)), np.zeros(len(names))
+    np.add.at(scores, at, (left - more * action) * action)
+    np.add.at(held, at, action**2 / power)
+    scores /= np.maximum(1.0 - held, 1e-9)
+    freedom = len(names) / max(len(names) - 1, 1)
+    scatter = math.sqrt(float(scores @ scores) / freedom) / power
+    error = math.hypot(scatter, lasting / math.sqrt(power / len(action)))
+    return more, error, 1.0 / float(held @ held)
+
 
 LAW_OF_SPEED = Signature("speed", "missing")  # signature of a force that depends on speed
 
@@ -94,12 +235,12 @@ class Credibility:
     def value(self) -> float:
         """The credibility: 1 for a stationary size that the signals do not replace, down to 0."""
         same = 1.0 / (1.0 + (self.drift / (HOST_DRIFT if self.exact else DRIFT)) ** 4)
-        same *= (1.0 - self.curve) / (1.0 + (self.unproven / UNPROVEN) ** 4)
+        same *= (1.0 - self.curve) / (1.0 + (self.unproven / PARTLY) ** 4)
         if self.exact:
             return same * (1.0 - self.remainder)
         if self.beside_flexible is None or self.against_flexible is None:
             return same
-        needed = FLEXIBLE_LEFT / max(self.beside_flexible, 1e-9)
+        needed = (1.0 - PARTLY) / max(self.beside_flexible, 1e-9)
         needed = min(needed, 1.0 / max(self.against_flexible, 1e-9))
         return same * (1.0 - self.remainder * (1.0 - 1.0 / (1.0 + needed**8)))
 
@@ -127,7 +268,7 @@ def remainder(gap: float, left: float, explained_below: float, own: float = 1.0)
     more, known = max(left**2 - error, 0.0), explained_below**2 - 1.0
     surely = more**4 / (more**4 + known**4)
     share = more / max(gap**2 - error, more, 1e-9)
-    return surely * share / (share + REMAINDER)
+    return surely * share / (share + FEW)
 
 
 def credibility(
@@ -144,7 +285,7 @@ def credibility(
     plain = Credibility(effect.name, regimes(case, acts), remainder=remains, curve=curve)
     if effect.stage == "schedule":
         return replace(plain, exact=True)
-    if remains < LEAST_REMAINDER or not acts or effect.signature.drawing == "time":
+    if remains < FEW or not acts or effect.signature.drawing == "time":
         return plain
     most = max(acts, key=lambda one: float(one.action @ one.action))
     beside, against = _flexible(case, found, most)

@@ -25,6 +25,8 @@ from numpy.typing import NDArray
 from coupled.display import split_unit
 from coupled.gap.chain import BY_NAME as STAGE_OF
 from coupled.gap.chain import stage_of
+from coupled.gap.findings.budget import ChannelShrink, channel_shrink
+from coupled.gap.findings.credibility import Acts, regimes
 from coupled.gap.findings.curvefit import Basis, Pick, Values, choose, closed_form, with_nodes
 from coupled.gap.findings.curvelaws import (
     LAWS,
@@ -36,9 +38,7 @@ from coupled.gap.findings.curvelaws import (
     units_of,
     with_curve,
 )
-from coupled.gap.findings.regimes import Acts, regimes
 from coupled.gap.findings.result import EffectResult
-from coupled.gap.findings.shrink import ChannelShrink, channel_shrink
 from coupled.gap.findings.where import signals
 from coupled.gap.search.case import Case
 from coupled.gap.search.evidence import Evidence, evidence, fewest_unexplained, misfit

@@ -11,19 +11,24 @@ from coupled.arguments import public
 from coupled.gap.chain import Part
 from coupled.gap.effects.effect import Effect, keys_of
 from coupled.gap.effects.library import EFFECTS
+from coupled.gap.findings.budget import ChannelShrink, Shrink
 from coupled.gap.findings.changed import Comparison
 from coupled.gap.findings.curves import Curve, Curves
-from coupled.gap.findings.flown import Again, ChannelAgain, closed_loop, nearer
+from coupled.gap.findings.flown import (
+    Again,
+    ChannelAgain,
+    EffectInFlight,
+    closed_loop,
+    in_flight,
+    in_words,
+    nearer,
+)
 from coupled.gap.findings.healthy import Baseline
-from coupled.gap.findings.inflight import EffectInFlight, in_flight, in_words
-from coupled.gap.findings.inseparable import Alike
-from coupled.gap.findings.power import EffectPower, power
-from coupled.gap.findings.proposal import ProposedTest, in_one_line, next_tests
+from coupled.gap.findings.proposal import EffectPower, ProposedTest, in_one_line, next_tests, power
 from coupled.gap.findings.result import FORMAT, EffectResult, Findings
-from coupled.gap.findings.shrink import ChannelShrink, Shrink
 from coupled.gap.findings.summary import MISFIT, NOISE, filtered_words, summary
 from coupled.gap.search.case import Case
-from coupled.gap.search.found import Choice
+from coupled.gap.search.found import Alike, Choice
 from coupled.gap.signals.output import Output
 from coupled.gap.signals.reading import worth_recording
 from coupled.gap.thresholds import CERTAIN

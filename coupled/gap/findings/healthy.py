@@ -30,7 +30,7 @@ from coupled.gap.search.case import Case
 from coupled.gap.search.found import Fit
 from coupled.gap.search.problem import Problem
 from coupled.gap.signals.output import HiddenGap, Output, Part
-from coupled.gap.thresholds import HEALTHY_ALONE, HEALTHY_SIGMAS
+from coupled.gap.thresholds import ROUGH, SIGMAS
 from coupled.record.channels import ControlName
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
@@ -65,7 +65,7 @@ class ModelError:
         blocks = np.concatenate(
             [_by_stretch(o, left) for o, left in zip(outputs, lefts, strict=True)]
         )
-        few = HEALTHY_ALONE / math.sqrt(len(each))
+        few = ROUGH / math.sqrt(len(each))
         several = len(each) > 1 and power > 0.0  # a channel computed by the host may have none
         scatter = float(np.std(each, ddof=1) / np.mean(each)) if several else 0.0
         return cls(
@@ -131,9 +131,9 @@ def tolerances(case: Case, found: Fit) -> dict[str, float]:
                 continue
             filed = float(p.nominal(case.nominal, case.control))
             each = [float(p.entered(filed, one.values[name])) for one in fits]
-            least = HEALTHY_ALONE if len(numbers) == 1 else 0.0
+            least = ROUGH if len(numbers) == 1 else 0.0
             least *= abs(float(p.entered(filed, found.values[name])) - filed)
-            scatter = max(HEALTHY_SIGMAS * float(np.std(each, ddof=1)), least)
+            scatter = max(SIGMAS * float(np.std(each, ddof=1)), least)
             if scatter > 0.0:
                 wide[key] = scatter
     return wide

@@ -1,12 +1,18 @@
-"""The next test: the record that would discriminate two alternatives (T-optimal design).
+"""What would have shown, and what to record next.
 
-Each candidate test is simulated with one alternative, with noise. Both alternatives are fitted to
-the simulated record, since without the fit any test would seem to separate them. The criterion is
-the log-likelihood gain of the true one over the other.
+An effect shows if its signature raises a stage from its noise floor to its limit. The signature is
+first made orthogonal to those of the nuisance parameters. The smallest size is found by bisection.
+A deviation within the tolerance of a nuisance parameter is no effect.
+
+The next test would discriminate two alternatives (T-optimal design). Each candidate test is
+simulated with one alternative, with noise. Both alternatives are fitted to the simulated record,
+since without the fit any test would seem to separate them. The criterion is the log-likelihood gain
+of the true one over the other.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -15,8 +21,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.errors import InputError
-from coupled.gap.effects.effect import Effect, value_of
+from coupled.gap.effects.effect import (
+    Effect,
+    Parameter,
+    apply,
+    keys_of,
+    possible,
+    touched,
+    value_of,
+)
 from coupled.gap.effects.library import EFFECTS
+from coupled.gap.effects.settings import contact, settings
 from coupled.gap.findings.flown import fly_force
 from coupled.gap.findings.summary import plain
 from coupled.gap.search.case import Case
@@ -27,12 +42,161 @@ from coupled.gap.signals.output import Output, white
 from coupled.gap.stages.airframe import airframe_outputs
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points
-from coupled.gap.thresholds import PUSHED, SEPARATED_GAIN, TEST_EDGE_s, TEST_s
+from coupled.gap.stages.tried import lacking_keys
+from coupled.gap.thresholds import (
+    MOST,
+    POWER_DECADES,
+    POWER_HALVINGS,
+    PUSHED,
+    SEPARATED_GAIN,
+    FLIGHT_s,
+    PIECE_s,
+)
 from coupled.record.channels import ControlName, channel, noisy_channels
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
 
 Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class EffectPower:
+    """The smallest size of an effect that would have been detected.
+
+    `judged`: its stage can be judged; `shows`: some size within its bounds would be detected.
+    """
+
+    name: str
+    stage: str
+    judged: bool = True
+    shows: bool = False
+    parameters: tuple[tuple[str, float], ...] = ()
+    control: str | None = None  # where several are judged; None for the airframe
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the JSON."""
+        found: dict[str, Any] = {"name": self.name, "stage": self.stage}
+        if not self.judged:
+            return found | {"judged": False}
+        found["shows"] = self.shows
+        return found | ({"parameters": dict(self.parameters)} if self.shows else {})
+
+
+def power(
+    nominal: Rig,
+    control: ControlName,
+    outputs: Sequence[Output],
+    library: Sequence[Effect] = EFFECTS,
+) -> tuple[EffectPower, ...]:
+    """Return the smallest detectable size of each effect."""
+    lacking = lacking_keys(nominal)
+
+    def judging(effect: Effect) -> list[Output]:
+        return [] if lacking & keys_of([effect]) else touched(outputs, [effect])
+
+    return tuple(_power(nominal, control, judging(one), one) for one in library)
+
+
+def _power(
+    nominal: Rig, control: ControlName, ours: Sequence[Output], effect: Effect
+) -> EffectPower:
+    if not ours:
+        return EffectPower(effect.name, effect.stage, judged=False)
+    values = _least(nominal, control, ours, effect)
+    if values is None:
+        return EffectPower(effect.name, effect.stage)
+    sizes = tuple(
+        (p.named(control), values[effect.value_key(p)]) for p in effect.free if p.role != "shape"
+    )
+    return EffectPower(effect.name, effect.stage, shows=True, parameters=sizes)
+
+
+def _values(effect: Effect, size: float, nominal: Rig, control: ControlName) -> dict[str, float]:
+    """Return the parameters of an effect of a size; at size 1 they are the fit's first start."""
+    values = {}
+    for p in effect.free:
+        start = p.starts[0]
+        if p.role == "shape":
+            value = start
+        elif p.mode == "factor":
+            off = size * (start - 1.0)
+            value = 1.0 + math.copysign(max(abs(off), p.tolerance), off)
+        elif p.is_limit:
+            value = start / size
+        else:
+            value = _base(p, nominal, control) + size * start
+        values[effect.value_key(p)] = float(np.clip(value, p.low, p.high))
+    return values
+
+
+def _base(p: Parameter, nominal: Rig, control: ControlName) -> float:
+    """Return the value from which a parameter's size counts."""
+    if p.mode != "value":
+        return 0.0
+    return float(value_of(nominal, control, p.above or p.key))
+
+
+def _signature(
+    nominal: Rig, control: ControlName, outputs: Sequence[Output], effect: Effect, size: float
+) -> float:
+    """Return the largest rms signature of an effect in an output, nuisance parameters profiled.
+
+    It is relative to the signature that raises a residual of noise alone to the output's limit; 0
+    if the rig cannot have the effect.
+    """
+    rig = possible(nominal, control, [effect], _values(effect, size, nominal, control))
+    if rig is None:
+        return 0.0
+    largest = 0.0
+    for output in outputs:
+        change = output.residual(rig) - output.residual(nominal)
+        basis = _settings(nominal, control, output, effect)
+        if basis.size:
+            change = change - basis @ np.linalg.lstsq(basis, change, rcond=None)[0]
+        wanted = math.sqrt(output.limit**2 - 1.0)
+        largest = max(largest, float(np.sqrt(np.mean(change**2))) / wanted)
+    return largest
+
+
+def _settings(nominal: Rig, control: ControlName, output: Output, effect: Effect) -> Floats:
+    """Return the signatures of the stage's nuisance parameters, a column each."""
+    columns = []
+    known = settings(nominal, control, [output])
+    beside = [one for name, one in known.items() if name != effect.name]
+    for setting in (*beside, *(contact(nominal, control) if effect.dry else ())):
+        if output.stage in setting.shows_in:
+            (number,) = setting.free
+            nudge = MOST * (number.high - number.starts[0])
+            values = {setting.value_key(number): number.starts[0] + nudge}
+            rig = apply(nominal, control, [setting], values)
+            columns.append(output.residual(rig) - output.residual(nominal))
+    return np.column_stack(columns) if columns else np.empty((0, 0))
+
+
+def _least(
+    nominal: Rig, control: ControlName, outputs: Sequence[Output], effect: Effect
+) -> dict[str, float] | None:
+    """Return the smallest parameters at which an effect is detected; None if at no size."""
+
+    def shows(size: float) -> bool:
+        return _signature(nominal, control, outputs, effect, size) >= 1.0
+
+    if not effect.free:
+        return {} if shows(1.0) else None
+    high = 1.0
+    while not shows(high):
+        high *= 10.0
+        if high > 10.0**POWER_DECADES:
+            return None
+    low = high / 10.0
+    while shows(low):
+        low, high = low / 10.0, low
+        if low < 10.0**-POWER_DECADES:
+            break
+    for _ in range(POWER_HALVINGS):
+        middle = math.sqrt(low * high)
+        low, high = (low, middle) if shows(middle) else (middle, high)
+    return _values(effect, high, nominal, control)
 
 
 @dataclass(frozen=True)
@@ -135,22 +299,22 @@ def pushes(nominal: Rig, record: Record, control: ControlName) -> Iterator[Push]
         return
     written = f"{most:.0f}" if most >= 10.0 else f"{most:.2g}"
     rate = nominal.frame_rate
-    time = np.arange(round(TEST_s * rate)) / rate
+    time = np.arange(round(FLIGHT_s * rate)) / rate
     settings = _pressures(nominal, record, control, len(time))
     for text, shape in _shapes(time):
         for where, pressure, rig in settings:
             on = f" on the {control}" if len(nominal.controls) > 1 else ""
-            text_of = f"{text} of ±{written} N{on} for {TEST_s:g} s {where}"
+            text_of = f"{text} of ±{written} N{on} for {FLIGHT_s:g} s {where}"
             yield Push(text_of, most * shape, pressure, rig, control)
 
 
 def _shapes(time: Floats) -> list[tuple[str, Floats]]:
     """Return forces that a hand can apply, scaled to ±1, zero at both ends."""
-    quiet = np.clip(np.minimum(time, time[-1] - time) / TEST_EDGE_s, 0.0, 1.0)
+    quiet = np.clip(np.minimum(time, time[-1] - time) / PIECE_s, 0.0, 1.0)
     slow = np.abs(((time / 5.0 + 0.75) % 1.0) * 4.0 - 2.0) - 1.0
     chirp = np.sin(2.0 * np.pi * (0.1 + 0.07 * time) * time)
     holds = np.repeat([1.0, -0.6, 0.3, -1.0, 0.5, 0.0], -(-len(time) // 6))[: len(time)]
-    width = max(3, round(TEST_EDGE_s / (time[1] - time[0])))
+    width = max(3, round(PIECE_s / (time[1] - time[0])))
     edge = np.hanning(width + 2)
     steps = np.convolve(holds, edge / edge.sum(), mode="same")
     return [

@@ -1,6 +1,9 @@
-"""The results of a diagnosis as data; `as_dict` of each returns its part of the JSON.
+"""The result of a diagnosis, and its JSON.
 
-The keys are those of the contract. SI units; a gap is a residual's RMS over its noise floor.
+`as_dict` of each part returns its JSON. The keys are those of the contract. SI units; a gap is a
+residual's RMS over its noise floor.
+
+Read back, the keys that other parts of the package use are checked, and other keys ignored.
 """
 
 from __future__ import annotations
@@ -11,6 +14,8 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from coupled.arguments import public
+from coupled.errors import InputError
+from coupled.files import check_format
 from coupled.gap.effects.airframe import TERM
 from coupled.gap.effects.effect import dotted
 from coupled.gap.findings.budget import StageBudget
@@ -19,6 +24,7 @@ from coupled.gap.findings.where import Remains, Where
 from coupled.gap.search.course import Course
 from coupled.gap.signals.output import HiddenGap, explained_below
 from coupled.gap.thresholds import FAULTY_FROM
+from coupled.schema import Lenient, quantity, read_as
 
 # Of the JSON. A file without a format is read as one from before formats were numbered; a newer
 # format is refused (`files.check_format`).
@@ -264,3 +270,64 @@ class Findings:
     def guilty(self) -> tuple[str, ...]:
         """The names of the faulty stages."""
         return tuple(stage.name for stage in self.stages if stage.guilty)
+
+
+# `refused` and `failed` are verdicts of records that could not be diagnosed.
+AnyVerdict = Literal["no_gap", "effect", "mostly", "ambiguous", "unexplained", "refused", "failed"]
+
+
+class KeptParameter(Lenient):
+    """A parameter of an effect, SI; a bound of its 95 % interval is None if it is open."""
+
+    value: float | str | None = None
+    low: float | None = None
+    high: float | None = None
+
+
+class KeptEffect(Lenient):
+    """An effect found."""
+
+    name: str
+    probability: float = quantity("", ge=0, le=1)
+    control: str | None = None
+    parameters: dict[str, KeptParameter] = {}
+
+
+class KeptStage(Lenient):
+    """A stage, judged or not."""
+
+    guilty: bool = False
+    missing: list[str] = []
+
+
+class KeptShrink(Lenient):
+    """The reduction of the gap by the effects found."""
+
+    closed: float | None = None
+
+
+class KeptMade(Lenient):
+    """The inputs of the diagnosis."""
+
+    rig: str | None = None
+
+
+class KeptDiagnosis(Lenient):
+    """The JSON of a diagnosis."""
+
+    verdict: AnyVerdict
+    effects: list[KeptEffect]
+    stages: dict[str, KeptStage]
+    rivals: list[list[str]] = []
+    shrink: KeptShrink = KeptShrink()
+    budget: dict[str, dict[str, float]] = {}
+    made: KeptMade = KeptMade()
+    why: str = ""
+
+
+def diagnosis_from(table: Any, file: object) -> KeptDiagnosis:
+    """Return the diagnosis that a JSON file holds. Raises InputError, naming file and key."""
+    if not isinstance(table, dict):
+        raise InputError(file, "", "is not a diagnosis written by coupled diagnose")
+    check_format(table.get("format"), FORMAT, file, "diagnosis")
+    return read_as(KeptDiagnosis, table, file)

@@ -10,14 +10,13 @@ from dataclasses import replace
 
 from coupled.display import System, in_system, split_unit, unit_in
 from coupled.gap.effects.airframe import TERM
-from coupled.gap.effects.effect import dotted
+from coupled.gap.effects.effect import Switch, dotted
 from coupled.gap.effects.library import BY_NAME
-from coupled.gap.findings.budget import StageBudget
+from coupled.gap.findings.budget import Shrink, StageBudget
 from coupled.gap.findings.result import EffectResult, Findings, ParameterEstimate, StageResult
-from coupled.gap.findings.shrink import Shrink
 from coupled.gap.findings.where import Remains, Where
 from coupled.gap.noise.lines import SeenLine
-from coupled.gap.thresholds import CERTAIN, FREE_LEAST
+from coupled.gap.thresholds import CERTAIN, MINOR, MOST_CHANGE
 
 _SENTENCE = re.compile(r"(?<=\.) (?=[A-ZΑ-Ω])")
 OF_SIGNAL = {
@@ -64,7 +63,6 @@ def filtered_words(filtered: Mapping[str, str]) -> str:
     return " ".join(said)
 
 
-MOST_CHANGE = 100.0  # % a minute, beyond which a rate is no drift of a machine
 FAST = "changes by more than its own size within a minute"
 
 
@@ -144,7 +142,7 @@ def no_gap_in(controls: Sequence[str], floor: str = NOISE) -> str:
 def _acting(found: Findings, stage: StageResult, budget: StageBudget | None) -> list[EffectResult]:
     """Return the effects of a stage, and others that explain a share of its gap."""
     beside = (effect for effect in found.effects if effect.stage != stage.name)
-    shown = [] if budget is None else [e for e in beside if budget.of(e.name) >= FREE_LEAST / 100]
+    shown = [] if budget is None else [e for e in beside if budget.of(e.name) >= MINOR]
     return [*(effect for effect in found.effects if effect.stage == stage.name), *shown]
 
 
@@ -198,7 +196,7 @@ def _set(found: Findings) -> str:
         for one in found.effects
         if one.name in BY_NAME
         for p in BY_NAME[one.name].parameters
-        if p.mode == "switch"
+        if isinstance(p, Switch)
     ]
     for one in switches:
         key = dotted(one.key_on(found.control), found.control)
@@ -298,7 +296,7 @@ def _remains(stage: str, left: Remains) -> str:
     share = round(100 * left.free_share)
     of = "the stage's own signals" if left.free_in == "all" else _signal(left.free_in)
     takes = f"{share} % could be some function of {of}"
-    if share < FREE_LEAST:
+    if share < 100.0 * MINOR:
         takes = "no function of the stage's signals predicts held-out stretches"
     size = f"{left.gap:.3g} floors"
     return f"The residual of the {stage} with these effects is {size}: {follows}{takes}."

@@ -1,43 +1,121 @@
-"""A description of a stage's residual: correlated signals, frequency, onset.
+"""Where a residual lies, since when, and what a model free in form predicts of it.
+
+Ridge regressions show whether the stage's own signals predict a residual that the effects leave:
+piecewise linear functions of one signal, with knots at its quantiles, lagged copies, the same
+filtered by the stage's response, or all signals with their pairwise products. The models are fitted
+on every other stretch and compared on the stretches between.
 
 The residual is regressed on each of the stage's own signals: the share of its variance that a
-straight line explains, and the slope. Onset and end are found by windows of the same excitation
-(`onset`).
+straight line explains, and the slope. Onset and end are found by windows of the same excitation.
+
+A gap that grows with the motion is small while the motion is small, which is no onset. So a quiet
+window is evidence only in comparison with the loud windows that were excited no more, in every
+signal that drives the stage. If nearly all of these are loud, something has changed in between. If
+excitation alone decided, all windows before would be quiet with probability Π(1 − q), where q is
+the loud share of the windows excited no more.
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import combinations, pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.gap.findings.flexible import free_share
-from coupled.gap.findings.onset import Span, in_time
-from coupled.gap.noise.filters import of_second_order
 from coupled.gap.noise.lines import SeenLine, widest_line
+from coupled.gap.noise.noise import filtered, of_second_order
 from coupled.gap.noise.smooth import rate_of, smoothed
 from coupled.gap.signals.output import Output
 from coupled.gap.thresholds import (
-    NEAR_DENSER,
+    BENDS,
+    DOUBLED,
+    DRIVES,
+    MINOR,
+    MORE,
+    MOST,
     NEAR_SHARE,
-    NO_SIGN,
-    WHERE_MOST,
-    WHERE_SHARE,
-    NEAR_s,
+    ONSET_CHANCE,
+    RIDGES,
+    TINY,
+    TRIES,
+    LAGS_s,
     SPECTRUM_s,
+    WINDOW_s,
 )
 from coupled.record.channels import ControlName, channel, unit_of
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
 
+Floats = NDArray[np.float64]
+Response = tuple[Floats, Floats]
+ALL = "all"
+
+
+def free_share(
+    output: Output, left: Floats, signals: Mapping[str, Floats], response: Response | None = None
+) -> tuple[float, str]:
+    """Return the share of a residual's power that the best model predicts, 0 to 1, and its signal.
+
+    `left` is the residual in noise floors, shape (frames,), as each signal. `response` is the
+    digital filter from a force inside the stage to its output. The share is that on held-out
+    stretches; the signal is `ALL` for a model of all signals.
+    """
+    plain = {name: (s - s.mean()) / s.std() for name, s in signals.items() if s.std() > 0.0}
+    each = {name: _functions(signal, output.frame_rate_Hz) for name, signal in plain.items()}
+    crossed = [a * b for a, b in combinations(plain.values(), 2)]
+    if crossed:
+        each[ALL] = np.column_stack((*each.values(), *crossed))
+    best = 0.0, ""
+    for name, columns in each.items():
+        answers = [] if response is None else [filtered(*response, columns)]
+        best = max(best, (_taken(output, left, np.hstack((columns, *answers))), name))
+    return best
+
+
+def _functions(signal: Floats, rate_Hz: float) -> Floats:
+    """Return a model's functions of one signal, shape (frames, functions)."""
+    found = [signal, *(np.maximum(signal - bend, 0.0) for bend in np.quantile(signal, BENDS))]
+    for lag_s in LAGS_s:
+        share = -np.expm1(-1.0 / (lag_s * rate_Hz))
+        found.append(filtered([share], [1.0, share - 1.0], signal))
+    return np.column_stack(found)
+
+
+def _taken(output: Output, left: Floats, columns: Floats) -> float:
+    """Return the share of the residual's power that the functions predict on held-out stretches.
+
+    The held-out stretches also select the ridge parameter. The residual is autocorrelated, so
+    cross-validation by single frames would overfit.
+    """
+    fitted = output.rows("fitted")
+    remains = np.zeros(len(RIDGES))
+    for known in (fitted, ~fitted):
+        made = _ridges(columns[known], left[known], columns[~known])
+        remains += np.sum((left[~known, None] - made) ** 2, axis=0)
+    power = float(left @ left)
+    return max(0.0, 1.0 - float(np.min(remains)) / power) if power > 0.0 else 0.0
+
+
+def _ridges(known: Floats, wanted: Floats, asked: Floats) -> Floats:
+    """Return the ridge regressions' predictions, shape (frames, RIDGES)."""
+    spread = known.std(axis=0)
+    varies = spread > TINY * np.vstack((known, asked)).std(axis=0)
+    mean, spread = known[:, varies].mean(axis=0), spread[varies]
+    level = float(wanted.mean())
+    left, sizes, right = np.linalg.svd((known[:, varies] - mean) / spread, full_matrices=False)
+    passed = sizes[:, None] / (sizes[:, None] ** 2 + np.array(RIDGES) * len(wanted))
+    weights = right.T @ (passed * (left.T @ (wanted - level))[:, None])
+    return np.asarray(level + (asked[:, varies] - mean) / spread @ weights)
+
+
 AIRFRAME = (
     *("elevator_rad", "pitch_rate_rad_per_s", "alpha_rad"),
     *("aileron_rad", "rudder_rad", "roll_rate_rad_per_s", "yaw_rate_rad_per_s", "sideslip_rad"),
 )
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -191,10 +269,10 @@ def _reversals(left: Floats, known: dict[str, Floats], rate_Hz: float) -> Revers
     last, following = turns[np.maximum(after - 1, 0)], turns[np.minimum(after, len(turns) - 1)]
     away_s = np.minimum(np.abs(frames - last), np.abs(following - frames)) / rate_Hz
     power = float(left @ left)
-    for within_s in NEAR_s:
+    for within_s in LAGS_s[:3]:
         near = away_s <= within_s
         share = float(left[near] @ left[near]) / power
-        if share >= NEAR_SHARE and share >= NEAR_DENSER * float(np.mean(near)):
+        if share >= NEAR_SHARE and share >= MORE * float(np.mean(near)):
             return Reversals(within_s, share)
     return None
 
@@ -261,7 +339,7 @@ def signals(
 
 def _sign(signal: Floats) -> Floats:
     """Return the sign of a signal; 0 where the signal is too small."""
-    return np.where(np.abs(signal) > NO_SIGN * np.sqrt(np.mean(signal**2)), np.sign(signal), 0.0)
+    return np.where(np.abs(signal) > MINOR * np.sqrt(np.mean(signal**2)), np.sign(signal), 0.0)
 
 
 def _follows(
@@ -283,7 +361,7 @@ def _follows(
         share = slope**2 * size / (len(left) * power)
         found.append(Follows(name, share, slope * output.floor))
     found.sort(key=lambda item: -item.share)
-    return tuple(item for item in found if item.share >= WHERE_SHARE)[:WHERE_MOST]
+    return tuple(item for item in found if item.share >= MINOR)[:TRIES]
 
 
 def _peak(left: Floats, rate_Hz: float) -> float:
@@ -306,3 +384,75 @@ def _by(left: Floats, pressure: Floats) -> tuple[PressureBand, ...]:
         if rows.any():
             found.append(PressureBand(low, high, float(np.sqrt(np.mean(left[rows] ** 2)))))
     return tuple(found)
+
+
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Span:
+    """A time in s from the record's start, with its bounds."""
+
+    at_s: float
+    low_s: float
+    high_s: float
+
+
+@dataclass(frozen=True)
+class InTime:
+    """The share of the windows in which a residual is loud, and its onset and end.
+
+    Onset or end is None if the excitation can explain it.
+    """
+
+    loud: float
+    begins: Span | None
+    ends: Span | None
+
+
+def in_time(left: Floats, drives: Mapping[str, Floats], rate_Hz: float) -> InTime:
+    """Return when a residual, in noise floors, is loud; `drives` are the stage's excitations."""
+    frames = max(1, round(WINDOW_s * rate_Hz))
+    rms = _rms(left, frames)
+    loud = rms > DOUBLED
+    excited = np.array([_rms(x - np.median(x), frames) for x in list(drives.values())[:DRIVES]])
+    window_s, last = frames / rate_Hz, len(loud)
+    share = float(np.mean(loud)) if last else 0.0
+    if not last or not loud.any() or not len(excited):
+        return InTime(share, None, None)
+    begins = _begins(loud, excited)
+    turned = _begins(loud[::-1], excited[:, ::-1])
+    return InTime(
+        share,
+        None if begins is None else Span(*(window_s * k for k in begins)),
+        None if turned is None else _turned(Span(*(last - k for k in turned)), window_s),
+    )
+
+
+def _turned(span: Span, window_s: float) -> Span:
+    return Span(window_s * span.at_s, window_s * span.high_s, window_s * span.low_s)
+
+
+def _begins(loud: Mask, excited: Floats) -> tuple[int, int, int] | None:
+    """Return the first loud window and the bounds of the onset, in windows; None if unsure."""
+    first, last = int(np.argmax(loud)), len(loud) - int(np.argmax(loud[::-1]))
+    chance, last_quiet = 0.0, 0
+    for i in range(first):
+        alike = np.all(excited[:, first:last] <= excited[:, i : i + 1], axis=0)
+        count, of = int(np.sum(loud[first:last][alike])), int(np.sum(alike))
+        if not of:
+            continue
+        likely = (count + 0.5) / (of + 1.0)
+        chance += math.log1p(-likely)
+        if likely >= MOST:
+            last_quiet = i + 1
+    if chance > math.log(ONSET_CHANCE):
+        return None
+    return first, last_quiet, first + 1
+
+
+def _rms(signal: Floats, frames: int) -> Floats:
+    count = len(signal) // frames
+    return np.asarray(
+        np.sqrt(np.mean(signal[: count * frames].reshape(count, frames) ** 2, axis=1))
+    )

@@ -18,12 +18,11 @@ from functools import cached_property
 from typing import Any
 
 from coupled.gap.chain import STAGES
+from coupled.gap.findings.budget import Shrink
 from coupled.gap.findings.diagnosis import Diagnosis, PartDiagnosis
-from coupled.gap.findings.inflight import in_words
-from coupled.gap.findings.power import EffectPower
-from coupled.gap.findings.proposal import ProposedTest
+from coupled.gap.findings.flown import in_words
+from coupled.gap.findings.proposal import EffectPower, ProposedTest
 from coupled.gap.findings.result import Findings, StageResult, Verdict, placed
-from coupled.gap.findings.shrink import Shrink
 from coupled.gap.findings.summary import capital, joined, no_gap_in
 from coupled.record.record import Record
 from coupled.rig.rig import Rig

@@ -18,20 +18,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.gap.thresholds import (
+    LESSER,
     LINE_BANDS,
     LINE_HEIGHT,
-    LINE_LEFT,
-    LINES_FROM,
     MAINS_OFF,
-    MOST_LINES,
-    WHERE_SHARE,
+    MINOR,
+    NOISE_FROM,
+    ROUNDS,
+    TAPER_BINS,
     WHITE_FRAMES,
     MAINS_Hz,
 )
 
 Floats = NDArray[np.float64]
-TAPER_BINS = 3  # bins to either side that a tone fills
-ROUNDS = 6  # Newton iterations for the frequency
 
 
 @dataclass(frozen=True)
@@ -77,13 +76,13 @@ def lines_in(signal: Floats) -> list[Line]:
     """Return the lines of a signal, the most significant first; shape (frames,)."""
     found: list[Line] = []
     left = signal
-    while len(signal) >= WHITE_FRAMES and len(found) < MOST_LINES:
+    while len(signal) >= WHITE_FRAMES and len(found) < ROUNDS:
         turn = _highest(left)
         if turn is None:
             return found
         line = _sharpened(left, turn)
         rest = left - line.over(len(left))
-        if _power_at(rest, line.turn) > LINE_LEFT * _power_at(left, line.turn):
+        if _power_at(rest, line.turn) > LESSER * _power_at(left, line.turn):
             return found
         found.append(line)
         left = rest
@@ -102,7 +101,7 @@ def widest_line(left: Floats, floor: float, rate_Hz: float) -> SeenLine | None:
     The residual is in noise floors, `floor` in the signal's unit.
     """
     lines = sorted(lines_in(left), key=lambda line: -line.amplitude)
-    if not lines or 0.5 * lines[0].amplitude ** 2 < WHERE_SHARE * float(np.mean(left**2)):
+    if not lines or 0.5 * lines[0].amplitude ** 2 < MINOR * float(np.mean(left**2)):
         return None
     seen = seen_as(lines[0], rate_Hz)
     return replace(seen, amplitude=seen.amplitude * floor)
@@ -148,7 +147,7 @@ def _highest(signal: Floats) -> float | None:
     rough = np.diff(signal, 4)
     power = np.abs(np.fft.rfft(rough * np.hanning(len(rough)))) ** 2
     omega = np.linspace(0.0, math.pi, len(power))
-    first = int(np.searchsorted(omega, LINES_FROM * math.pi))
+    first = int(np.searchsorted(omega, NOISE_FROM * math.pi))
     power = power[first:] / (2.0 * np.sin(0.5 * omega[first:])) ** 8
     parts = np.array_split(power, LINE_BANDS)
     level = np.concatenate([np.full(len(p), np.median(p) / math.log(2.0)) for p in parts])
@@ -164,7 +163,7 @@ def _sharpened(signal: Floats, turn: float) -> Line:
     """Return the sine near a bin's frequency, refined by its phase in both halves of the signal."""
     half = len(signal) // 2
     rough = np.diff(signal, 4)  # removes the slow motion of the rig
-    for _ in range(ROUNDS):
+    for _ in range(2 * ROUNDS):
         early, late = projected(rough[:half], turn), projected(rough[half:], turn)
         slip = late.phase - early.phase - turn * half
         turn += math.remainder(slip, 2.0 * math.pi) / half

@@ -33,16 +33,16 @@ from coupled.gap.search.problem import EXACT, Problem
 from coupled.gap.search.screen import Screen, Screened, Worth
 from coupled.gap.signals.output import explained_below, stage_gaps, stage_limits
 from coupled.gap.thresholds import (
-    BEAM_BESIDE,
     BEAM_CANDIDATES,
     BEAM_DEPTH,
-    BEAM_FIRST,
     BEAM_WIDTH,
-    BEGUN_BEHIND,
     GIVEN_UP,
+    MINOR,
+    MORE,
     PRIOR_EFFECT,
     RIVAL_GAIN,
     SHOOTINGS,
+    TRIES,
     VERY_STRONG,
 )
 from coupled.parallel import in_threads
@@ -53,8 +53,7 @@ Start = dict[str, float]
 Try = tuple[tuple[Effect, ...], Start, Fit]  # effects, start values, parent
 Started = tuple[float, Fit, Fit]  # log evidence, unfinished fit, parent
 COARSE, OWN = Descent("coarse"), Descent("own")
-FIRST, SHORT = Descent("coarse", BEAM_FIRST), Descent("coarse", SHOOTINGS)
-ABOVE = (1.05, 1.5)  # starts of a breakaway force, over the running friction
+FIRST, SHORT = Descent("coarse", TRIES), Descent("coarse", SHOOTINGS)
 
 
 def search_sets(case: Case, library: Sequence[Effect]) -> tuple[Case, Choice]:
@@ -205,17 +204,17 @@ def is_admissible(problem: Problem, fitted: Fit, needed: Names = frozenset()) ->
             key = effect.value_key(p)
             if key in fitted.at_bound:
                 return False
-            if p.name == "frequency_Hz" and not p.folds and fitted.values[key] >= fastest:
+            if p.name == "frequency_Hz" and p.kind != "aliased" and fitted.values[key] >= fastest:
                 return False
     return True
 
 
 def _excludes_neutral(case: Case, fitted: Fit, effect: Effect) -> bool:
     """Tell whether the 95 % interval of a size excludes the neutral value; true for a limit."""
-    sizes = [p for p in effect.free if p.scanned]
+    sizes = [p for p in effect.free if p.is_size]
     for p in sizes:
         key, none = effect.value_key(p), p.neutral(case.nominal, case.control)
-        if p.inverse or not fitted.low[key] <= none <= fitted.high[key]:
+        if p.is_limit or not fitted.low[key] <= none <= fitted.high[key]:
             return True
     return not sizes
 
@@ -288,7 +287,7 @@ def _fit_neighbours_of_best(beam: Beam, library: Sequence[Effect]) -> None:
             if (part := _fit_with_simpler_law(beam, law)) is not None:
                 beside = _candidates(part.effects, library, {*law.shows_in})
                 worth = Worth(PRIOR_EFFECT, beam.counts)
-                screened = beam.screen.best(part, beside, worth, BEAM_BESIDE)
+                screened = beam.screen.best(part, beside, worth, TRIES)
                 _fit_sets(
                     beam,
                     [t for one in screened for t in _starts_with_one_more(part, one, beam.contact)],
@@ -351,7 +350,7 @@ def _fit_neighbours(beam: Beam, fitted: Fit, library: Sequence[Effect], wanted: 
     parameters within their tolerance: beyond it they may have absorbed an effect.
     """
     is_best, fitted = names_of(fitted.effects) == beam.best, beam.problem.within_tolerance(fitted)
-    many = BEAM_CANDIDATES if is_best else BEAM_BESIDE
+    many = BEAM_CANDIDATES if is_best else TRIES
     beside, worth = (
         _candidates(fitted.effects, library, wanted),
         beam.worth(names_of(fitted.effects)),
@@ -447,7 +446,7 @@ def _sets_with_swap(beam: Beam, fitted: Fit, library: Sequence[Effect]) -> list[
         same = [e for e in _candidates(rest, library, {*old.shows_in}) if e is not old]
         if rig is not None:
             base = replace(fitted, effects=rest, rig=rig)
-            found = beam.screen.best(base, same, beam.worth(beam.best), BEAM_BESIDE)
+            found = beam.screen.best(base, same, beam.worth(beam.best), TRIES)
             tries += [
                 t for one in found for t in _starts_with_one_more(base, one, beam.contact)[:1]
             ]
@@ -489,8 +488,8 @@ def _starts_with_other_law(beam: Beam, fitted: Fit, old: Effect, law: Effect) ->
         elif level is not None:
             filed = level.nominal(case.nominal, case.control)
             running = float(level.entered(filed, fitted.values[old.value_key(level)]))
-            start[law.value_key(p)] = ABOVE[0] * running
-            higher[law.value_key(p)] = ABOVE[1] * running
+            start[law.value_key(p)] = (1.0 + MINOR) * running
+            higher[law.value_key(p)] = MORE * running
     effects = (*rest, law)
     return [(effects, start, fitted), *([(effects, start | higher, fitted)] if higher else [])]
 
@@ -516,7 +515,7 @@ def _fit_sets(beam: Beam, tries: Sequence[Try]) -> list[Fit]:
 
     started = sorted(in_threads(start_fit, list(unique.values())), key=lambda one: -one[0])
     most = max(started[0][0], beam.log(beam.best))
-    going = [one for one in started if one[0] > most - BEGUN_BEHIND]
+    going = [one for one in started if one[0] > most - (4.0 * GIVEN_UP)]
     first: dict[Names, Started] = {}
     for one in going:
         first.setdefault(names_of(one[1].effects), one)

@@ -1,24 +1,69 @@
-"""The input of the search for effects: a nominal rig, its outputs and nuisance parameters."""
+"""The input of the search for effects: a nominal rig, its outputs and nuisance parameters.
+
+The presliding parameters of friction, length and elastic share, need a start of their own. The
+positions in which a control sticks change with both parameters, so that the cost has many local
+minima, and least squares stay near their start. The start is therefore the best point of a grid,
+refined by a pattern search without derivatives (Hooke and Jeeves, J. ACM 8, 1961).
+
+If the rig file has friction, its presliding parameters are nuisance parameters. Their law has the
+model error of a right effect: a small share of the gap of a rigid contact may remain.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import product
 from math import hypot
 
 import numpy as np
 
 from coupled.gap.effects.effect import Effect, possible, touched
 from coupled.gap.effects.library import LAG, STAMP
-from coupled.gap.effects.settings import contact, lag_within_a_step, settings
-from coupled.gap.search.contact import contact_start
+from coupled.gap.effects.settings import contact, is_dry, lag_within_a_step, settings
 from coupled.gap.search.course import Bounds, Timing, timed
 from coupled.gap.search.found import Fit
 from coupled.gap.signals.output import Output, stage_gaps, stage_limits
-from coupled.gap.thresholds import LOWER_NOISE, SETTINGS_FROM
+from coupled.gap.thresholds import ELASTIC_SHARES, LENGTHS, LESSER, MINOR, MISMATCH, SEARCHED_TO
 from coupled.record.channels import ControlName
 from coupled.rig.rig import Rig
+
+Cost = Callable[[float, float], float]  # mean square residual by a length, d, and a share
+
+
+def contact_start(cost: Cost, most: float, most_elastic: float) -> tuple[float, float]:
+    """Return the length, d, and elastic share of least cost, each up to its largest value."""
+    known: dict[tuple[float, float], float] = {}
+
+    def cost_at(at: tuple[float, float]) -> float:
+        if at not in known:
+            known[at] = cost(*at)
+        return known[at]
+
+    def within(length: float, share: float) -> tuple[float, float]:
+        return min(max(length, 1e-3 * most), most), min(max(share, 0.0), most_elastic)
+
+    best = min((within(x * most, s) for x, s in product(LENGTHS, ELASTIC_SHARES)), key=cost_at)
+    times, more = 1.5, 0.2
+    while times - 1.0 > SEARCHED_TO:
+        length, share = best
+        longer = ((length * times, share), (length / times, share))
+        softer = ((length, share + more), (length, share - more))
+        near = min((within(*step) for step in (*longer, *softer)), key=cost_at)
+        if cost_at(near) < cost_at(best):
+            best = near
+        else:
+            times, more = times**0.5, 0.5 * more
+    return best
+
+
+def allowing_for_contact(output: Output, rig: Rig, control: ControlName) -> Output:
+    """Return an output with the gap that errors of the presliding law may cause (`mismatch`)."""
+    if output.stage != "loader" or not is_dry(rig, control) or not contact(rig, control):
+        return output
+    return replace(output, mismatch=MISMATCH * max(output.gap(rig) - 1.0, 0.0))
+
 
 Tell = Callable[[str, int, int], None]
 
@@ -98,7 +143,7 @@ class Case:
     @cached_property
     def _above_noise(self) -> set[str]:
         """The outputs whose residual with the nominal rig exceeds the noise floor."""
-        return {output.stage for output in self.outputs if output.gap(self.nominal) > SETTINGS_FROM}
+        return {output.stage for output in self.outputs if output.gap(self.nominal) > (1.0 + MINOR)}
 
     @cached_property
     def by_shots(self) -> Case | None:
@@ -249,4 +294,4 @@ def _has_lower_noise(new: Output, old: Output) -> bool:
 
     A measured trim position of the elevator depends on the rig; then the measurements differ.
     """
-    return new.own < LOWER_NOISE * old.own and np.array_equal(new.measured, old.measured)
+    return new.own < (1.0 - LESSER) * old.own and np.array_equal(new.measured, old.measured)

@@ -32,20 +32,20 @@ from scipy.special import chdtri
 from coupled.gap.effects.effect import Effect, dotted, value_of
 from coupled.gap.signals.output import Output, memory
 from coupled.gap.thresholds import (
-    COURSE_CHANGES,
     COURSE_GAIN,
-    COURSE_POWER,
+    ENDS,
+    FEWEST_WINDOWS,
+    FINE,
+    NEGLIGIBLE,
     ONSET_CHANCE,
-    COURSE_WINDOW_s,
+    ROUGH,
     ONSETS_s,
+    WINDOW_s,
 )
 from coupled.record.channels import ControlName
 from coupled.rig.rig import Rig
 
 Floats = NDArray[np.float64]
-FEWEST_WINDOWS = 12  # least number of windows for a time history other than constant
-FINE = 61  # onsets of the fine search about the best ramp
-ENDS = 3  # windows at either end of the record that are excluded as onsets
 Kind = Literal["constant", "changes", "from", "grows", "events"]
 
 
@@ -133,7 +133,7 @@ def course_of(
     count = len(sizes) / memory(best.residual)
     changed = abs(best.factor) * times_s[-1] if best.kind == "changes" else math.inf
     gain = 0.5 * count * math.log(max(always.cost, 1e-300) / max(best.cost, 1e-300))
-    if gain < COURSE_GAIN or changed < COURSE_CHANGES:
+    if gain < COURSE_GAIN or changed < ROUGH:
         return plain
     near = [one for one in others if one.kind == best.kind and _near(one, best, count)]
     sure = 1.96 * math.sqrt(best.cost / max(count - 2.0, 1.0))
@@ -141,7 +141,7 @@ def course_of(
     factor = Bounds(best.factor, low, max(one.factor + sure * one.error for one in near))
     if best.kind == "changes":
         return Course(best.kind, rate_per_s=factor.times(value.value))
-    half_s = 0.5 * COURSE_WINDOW_s  # the resolution of an onset
+    half_s = 0.5 * WINDOW_s  # the resolution of an onset
     first, last = (pick(one.onset_s for one in near) for pick in (min, max))
     onset = Bounds(best.onset_s, first - half_s, last + half_s)
     if best.kind == "from":
@@ -173,7 +173,7 @@ def _sizes(parts: Sequence[tuple[Floats, Floats]], rate_Hz: float) -> tuple[Floa
 
     A window's time is the centroid of its action.
     """
-    frames = max(1, round(COURSE_WINDOW_s * rate_Hz))
+    frames = max(1, round(WINDOW_s * rate_Hz))
     count = min(len(action) for action, _ in parts) // frames
     power, along, at = np.zeros(count), np.zeros(count), np.zeros(count)
     frame_s = np.arange(count * frames).reshape(count, frames) / rate_Hz
@@ -183,7 +183,7 @@ def _sizes(parts: Sequence[tuple[Floats, Floats]], rate_Hz: float) -> tuple[Floa
         power += np.sum(a * a, axis=1)
         along += np.sum(a * r, axis=1)
         at += np.sum(a * a * frame_s, axis=1)
-    held = power > COURSE_POWER * float(np.mean(power)) if count else np.zeros(0, dtype=bool)
+    held = power > NEGLIGIBLE * float(np.mean(power)) if count else np.zeros(0, dtype=bool)
     weights = power[held]
     return np.asarray(along[held] / weights), weights, np.asarray(at[held] / weights)
 
@@ -217,7 +217,7 @@ def _onsets(times_s: Floats, sizes: Floats, weights: Floats) -> list[_Law]:
         found.append(_ramp(times_s, sizes, weights, onset_s))
     # The onset of a ramp is better known than to one window, and its slope depends on it.
     best = min((law for law in found if law.kind == "grows"), key=lambda law: law.cost)
-    near = best.onset_s + COURSE_WINDOW_s * np.linspace(-1.5, 1.5, FINE)
+    near = best.onset_s + WINDOW_s * np.linspace(-1.5, 1.5, FINE)
     found += [_ramp(times_s, sizes, weights, onset_s) for onset_s in near.tolist()]
     return found
 

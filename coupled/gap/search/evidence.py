@@ -117,7 +117,7 @@ def _width(problem: Problem, p: Parameter, group: Group, key: str) -> float:
         return flat
     value = group.values[key]
     none = p.base(case.nominal, case.control) if p.above else p.neutral(case.nominal, case.control)
-    size = abs(value) if p.inverse else abs(value - none)
+    size = abs(value) if p.is_limit else abs(value - none)
     error = 0.5 * (group.high[key] - group.low[key]) / 1.96
     size = min(max(size, error), flat) if math.isfinite(error) else flat
     return size * PRIOR_SPAN / math.sqrt(2.0 * math.pi)

@@ -31,19 +31,17 @@ from numpy.typing import NDArray
 from coupled.gap.effects.effect import Effect, Parameter, possible, touched
 from coupled.gap.effects.settings import CONTACT
 from coupled.gap.search.case import Case
-from coupled.gap.search.descent import WHOLE, Descent, End
+from coupled.gap.search.descent import WHOLE, Descent, End, Slope
 from coupled.gap.search.found import Fit, Group
 from coupled.gap.search.intervals import cost_of_unit_likelihood, half_width, least_of, open_above
-from coupled.gap.search.slopes import Slope
 from coupled.gap.signals.output import Output, Part, memory
-from coupled.gap.thresholds import FIT_LEGS, WEIGHT_CHANGED
+from coupled.gap.thresholds import DOUBLED, FAR, ROUNDS
 from coupled.parallel import go_on
 from coupled.record.channels import ControlName
 from coupled.rig.rig import Rig
 
 Floats = NDArray[np.float64]
 Normal = tuple[float, float]  # mean and standard deviation
-_FAR = 1e6  # noise floors: the residual of values that give no valid rig
 
 
 def fit_set(
@@ -166,7 +164,7 @@ def _fit(
     start: Mapping[str, float],
     descent: Descent = WHOLE,
     part: Part = "all",
-    legs: int = FIT_LEGS,
+    legs: int = ROUNDS,
 ) -> Group:
     """Return a fit; repeat a fit at the loader's own steps until its weights are consistent."""
     nominal, control = case.nominal, case.control
@@ -182,7 +180,7 @@ def _fit(
         values = dict(zip(keys, (scaled * scale).tolist(), strict=True))
         rig = possible(nominal, control, effects, values)
         if rig is None:
-            return [np.full(count, _FAR) for count in frames]
+            return [np.full(count, FAR**2) for count in frames]
         return [output.residual(rig, part, coarse, rough) for output in ours]
 
     firsts = [np.array(first) / scale for first in _starts(effects, start)]
@@ -220,7 +218,7 @@ def _fit(
         left = residual(_with(best.x, k, at))
         return 0.5 * float(left @ left)
 
-    for k in (k for k, p in enumerate(frees) if p.saturates):
+    for k in (k for k, p in enumerate(frees) if p.kind == "saturating"):
         most = cost(float(high[k]), k)
         if most < best.cost:
             span = (float(best.x[k]), float(high[k]))
@@ -229,7 +227,7 @@ def _fit(
             best = min(best, prior.without(found), key=lambda one: one.cost)
     free = _Free(keys, frees, scale, ends, weights, frames)
     changed = _changed(squares, best, free, ours)
-    if legs > 1 and descent.steps != "coarse" and changed > WEIGHT_CHANGED:
+    if legs > 1 and descent.steps != "coarse" and changed > DOUBLED:
         again = dict(zip(keys, (best.x * scale).tolist(), strict=True))
         rest = replace(descent, slopes={})
         return _fit(case, ours, effects, priors, again, rest, part, legs - 1)
@@ -291,9 +289,9 @@ def _group(
     stuck = small | np.isclose(best.x, high, rtol=1e-4)
     stuck &= ~np.array([p.may_end for p in free.numbers]) & ~gone
     # A limit that is never reached is undetermined; this does not invalidate the other parameters.
-    stuck |= ~np.isfinite(half) & ~np.array([p.may_end and p.inverse for p in free.numbers])
+    stuck |= ~np.isfinite(half) & ~np.array([p.may_end and p.is_limit for p in free.numbers])
     lower, upper = values - half, values + half
-    for k in (k for k, p in enumerate(free.numbers) if p.saturates):
+    for k in (k for k, p in enumerate(free.numbers) if p.kind == "saturating"):
         span, unit = (float(low[k]), float(high[k])), cost_of_unit_likelihood(best, outputs)
         open_one = open_above(partial(cost, k=k), float(best.x[k]), span, unit)
         if open_one is not None:

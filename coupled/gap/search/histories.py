@@ -18,7 +18,7 @@ from coupled.gap.search.course import Bounds, Course, course_of, course_of_event
 from coupled.gap.search.found import Choice, Fit
 from coupled.gap.search.problem import Problem
 from coupled.gap.signals.output import Floats, explained_below, stage_limits
-from coupled.gap.thresholds import BEGUN, LATER_LEFT, LATER_TRIED, COURSE_WINDOW_s
+from coupled.gap.thresholds import BEGUN, PARTLY, ROUNDS, WINDOW_s
 from coupled.record.record import Record
 
 Parts = list[tuple[Floats, Floats]]  # action of an effect and residual, of each output
@@ -43,14 +43,14 @@ def _search_with_onset(
     open_outputs = _open_outputs(case, found)
     gains = {step.effect.name: step.gain for step in found.steps} or found.tried
     known = {effect.name: effect for effect in library}
-    for name in sorted(gains, key=lambda one: -gains[one])[:LATER_TRIED]:
+    for name in sorted(gains, key=lambda one: -gains[one])[:ROUNDS]:
         effect = known[name]
         anew = in_time(effect, case) if open_outputs & set(effect.shows_in) else None
         if anew is None:
             continue
         after, choice = search_sets(anew, library)
         kept = any(after.timing(one) is not None for one in choice.fit.effects)
-        if kept and _left(after, choice) < LATER_LEFT * _left(case, found):
+        if kept and _left(after, choice) < PARTLY * _left(case, found):
             return after, choice
     return None
 
@@ -83,7 +83,7 @@ def course_in(effect: Effect, case: Case, found: Fit, records: list[Record]) -> 
     if effect.sampled is not None and effect.sampled.times is not None:
         at_s = effect.sampled.times(record)
         return course_of_events(at_s, len(record) / rate_Hz) if at_s.size else None
-    if effect.free[0].inverse:
+    if effect.free[0].is_limit:
         return None
     value = _size(effect, case, found)
     begun = case.timing(effect)
@@ -99,7 +99,7 @@ def in_time(effect: Effect, case: Case) -> Case | None:
     effects may have absorbed the error of a constant size.
     """
     number = effect.free[0] if effect.free else None
-    sized = number is not None and not number.inverse and not effect.gradual
+    sized = number is not None and not number.is_limit and not effect.gradual
     events = effect.sampled is not None and effect.sampled.times is not None
     if not sized or events or case.timing(effect) is not None:
         return None
@@ -111,7 +111,7 @@ def in_time(effect: Effect, case: Case) -> Case | None:
     rate_Hz = case.nominal.frame_rate
     seen = course_of(ours, rate_Hz, _size(effect, case, alone), effect.gradual)
     # A change from the record's start may be any drift: it is reported, and not taken as a cause.
-    if seen.onset_s is None or seen.onset_s.low < BEGUN * COURSE_WINDOW_s:
+    if seen.onset_s is None or seen.onset_s.low < BEGUN * WINDOW_s:
         return None
     anew = case.timed(effect, timing_of(ours, rate_Hz), seen.onset_s)
     # Estimate again at the fitted size: friction and play are not linear in their size.

@@ -18,12 +18,11 @@ from coupled.gap.search.descent import WHOLE, Descent
 from coupled.gap.search.fit import fit_set
 from coupled.gap.search.found import Fit
 from coupled.gap.signals.output import Output, Part, stage_gaps, stage_limits
-from coupled.gap.thresholds import MISMATCH
+from coupled.gap.thresholds import MISMATCH, NORMAL_95
 from coupled.rig.rig import Rig
 
 Floats = NDArray[np.float64]
 EXACT = ("schedule", "compensation", "linkage")  # outputs predicted without model error
-NORMAL_95 = 1.96  # standard deviations from the mean to an end of a 95 % interval
 
 
 class Prior(NamedTuple):

@@ -29,12 +29,12 @@ from coupled.gap.search.found import Fit
 from coupled.gap.search.problem import Problem
 from coupled.gap.signals.output import Floats, memory
 from coupled.gap.thresholds import (
-    ALIKE,
     BEAM_CANDIDATES,
     BEAM_FACTORS,
     BEAM_SIZES,
     LIMIT_BISECTIONS,
     LIMIT_SHARES,
+    MINOR,
     PRIOR_EFFECT,
     SCREEN_LESS,
     SCREEN_NEAR,
@@ -195,7 +195,7 @@ def _best_two(shapes: Floats, now: Floats) -> tuple[int, int]:
     np.fill_diagonal(alike, 1.0)
     own, apart = shapes @ now, np.maximum(1.0 - alike**2, 1e-300)
     power = own[:, None] ** 2 + own**2 - 2.0 * alike * np.outer(own, own)
-    power = np.where(np.abs(alike) < 1.0 - ALIKE, power / apart, 0.0)
+    power = np.where(np.abs(alike) < 1.0 - MINOR, power / apart, 0.0)
     i, j = np.unravel_index(int(np.argmax(power)), power.shape)
     return int(i), int(j)
 
@@ -247,7 +247,7 @@ def _sizes(problem: Problem, current: Fit, effect: Effect, shape: int) -> list[V
             start = value = p.starts[min(shape, len(p.starts) - 1)]
             if not flown and p.mode == "factor":
                 value = 1.0 + BEAM_FACTORS[k] * (start - 1.0)
-            elif not flown and p.scanned:
+            elif not flown and p.is_size:
                 value = BEAM_SIZES[k] * start
             value += p.base(current.rig, problem.case.control)
             values[effect.value_key(p)] = float(np.clip(value, p.low, p.high))
@@ -262,7 +262,7 @@ def _less(problem: Problem, effect: Effect, first: Values) -> list[Values]:
         values = dict(first)
         for p in effect.free:
             least = p.bounds(problem.case.nominal, problem.case.control)[0]
-            if p.scanned and least < p.low:
+            if p.is_size and least < p.low:
                 values[effect.value_key(p)] = share * least
         found += [values] if values != first else []
     return found
@@ -270,7 +270,7 @@ def _less(problem: Problem, effect: Effect, first: Values) -> list[Values]:
 
 def is_limit(effect: Effect) -> bool:
     """Tell whether an effect is a single limit."""
-    return len(effect.free) == 1 and effect.free[0].inverse
+    return len(effect.free) == 1 and effect.free[0].is_limit
 
 
 def limits(effect: Effect, shows: Callable[[float], bool]) -> list[list[float]]:

@@ -23,14 +23,14 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from coupled.gap.signals.output import Floats, estimate_noise, rounding
 from coupled.gap.thresholds import (
-    COUNTS,
+    FEW,
+    FEW_FRAMES,
     HELD_AT_MOST,
-    HELD_FINER,
     HELD_JUMPS,
-    HELD_SHARE,
     HELD_STEPS,
-    HELD_WINDOW,
-    SLOW_LOADER_s,
+    MOST,
+    NEGLIGIBLE,
+    SHORTEST_RECORD_s,
 )
 from coupled.record.channels import ControlName, channel, unit_of
 from coupled.record.record import Record
@@ -60,7 +60,7 @@ def drifts(rig: Rig, control: ControlName, gradient: float) -> bool:
     True if the loader's own period exceeds `SLOW_LOADER_s` at a gradient in N/d.
     """
     mass = rig.controls[control].loader.mass
-    return max(gradient, 0.0) * SLOW_LOADER_s**2 < 4.0 * np.pi**2 * mass
+    return max(gradient, 0.0) * SHORTEST_RECORD_s**2 < 4.0 * np.pi**2 * mass
 
 
 def softest_gradient(rig: Rig, control: ControlName, record: Record) -> float:
@@ -84,7 +84,7 @@ def _made(record: Record, control: ControlName) -> bool:
     given, grip = channel(control, "computed"), channel(control, "deflection")
     if any(name in record for name in others) or not (given in record and grip in record):
         return False
-    return _finest(record[given]) < HELD_FINER * estimate_noise(record[grip]).rms
+    return _finest(record[given]) < NEGLIGIBLE * estimate_noise(record[grip]).rms
 
 
 def _finest(signal: Floats) -> float:
@@ -95,11 +95,11 @@ def _finest(signal: Floats) -> float:
     repeat by rounding.
     """
     steps = np.abs(np.diff(signal))
-    if not np.any(steps) or len(steps) < HELD_WINDOW + 4:
+    if not np.any(steps) or len(steps) < FEW_FRAMES + 4:
         return np.inf
     least = float(np.diff(np.unique(signal)).min())
-    slowest = sliding_window_view(steps, HELD_WINDOW + 3).min(axis=1)
-    rough = sliding_window_view(np.diff(signal, 4), HELD_WINDOW)
+    slowest = sliding_window_view(steps, FEW_FRAMES + 3).min(axis=1)
+    rough = sliding_window_view(np.diff(signal, 4), FEW_FRAMES)
     moving = slowest > 1.5 * least
     noise = np.sqrt(np.mean(rough[moving] ** 2, axis=1) / 70.0)
     return float(np.quantile(noise, 0.1)) if noise.size else np.inf
@@ -117,7 +117,7 @@ def in_set_points(signal: Floats) -> bool:
     moving = apart[apart <= HELD_AT_MOST]
     sizes = np.abs(np.diff(signal)[changes])
     uneven = float(np.median(sizes)) > HELD_STEPS * float(sizes.min())
-    return uneven and len(moving) > 0 and float(np.mean(moving >= 2)) >= HELD_SHARE
+    return uneven and len(moving) > 0 and float(np.mean(moving >= 2)) >= (1.0 - FEW)
 
 
 def as_counted(rig: Rig, records: Collection[Record], control: ControlName) -> Rig:
@@ -139,4 +139,4 @@ def _count(record: Record, name: str) -> float:
     """Return the size of a channel's count in its unit, 0 where that is little of its noise."""
     signal = record[name]
     error = rounding(signal, math.inf)
-    return error * math.sqrt(12.0) if error > COUNTS * estimate_noise(signal).rms else 0.0
+    return error * math.sqrt(12.0) if error > MOST * estimate_noise(signal).rms else 0.0

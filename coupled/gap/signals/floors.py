@@ -1,18 +1,22 @@
-"""The noise of a channel: from its spectrum, or from the rig file if the log was filtered."""
+"""The noise of channels, and measured signals as inputs of the stages.
+
+The noise of a channel is estimated from its spectrum, or taken from the rig file if the log was
+filtered; that of two channels in common from a regression of their fourth differences. A measured
+signal is smoothed as the input of a stage, constant at rest, with its error.
+"""
 
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.gap.noise.noise import Noise
-from coupled.gap.noise.quiet import noise_of_input, quiet_noise
-from coupled.gap.noise.smooth import Smoother
+from coupled.gap.noise.noise import Noise, noise_of_input, quiet_noise
+from coupled.gap.noise.smooth import Rest, Smoother, rest_of, smoothed
 from coupled.gap.signals.output import estimate_noise, rounding
-from coupled.gap.thresholds import LEAST_NOISE, LOUDER
+from coupled.gap.thresholds import FEW_FRAMES, SHORT_FRAMES, SIGMAS, TINY
 from coupled.rig.rig import Rig
 
 Floats = NDArray[np.float64]
@@ -29,7 +33,7 @@ def noise_in(rig: Rig, channel: str, signal: Floats) -> Noise:
 def given_noise(rig: Rig, channel: str, signal: Floats) -> Noise:
     """Return the noise of a channel in the rig file; by default the least that a sensor has."""
     known = rig.noise.get(channel, 0.0)
-    least = LEAST_NOISE * float(np.sqrt(np.mean(signal**2)))
+    least = TINY * float(np.sqrt(np.mean(signal**2)))
     return Noise(known or max(least, rounding(signal, np.inf)))
 
 
@@ -51,7 +55,7 @@ def left_noise(
     """
     rows = np.ones(len(left), dtype=bool) if judged is None else judged
     found = None if estimated.filtered else quiet_noise(left[rows])
-    if found is not None and found.rms <= LOUDER * estimated.rms:
+    if found is not None and found.rms <= SIGMAS * estimated.rms:
         estimated = _no_less(found, signal)
     share = float(np.mean(rows)) or 1.0
     return replace(estimated, rms=estimated.rms * math.sqrt(share))
@@ -91,4 +95,75 @@ def floor_from(rig: Rig, channel: str, signal: Floats) -> str:
         return "the level at its highest frequencies"
     if rig.noise.get(channel, 0.0) > 0.0:
         return "the rig file"
-    return f"1/{1.0 / LEAST_NOISE:g} of the signal's RMS, since the rig file does not give it"
+    return f"1/{1.0 / TINY:g} of the signal's RMS, since the rig file does not give it"
+
+
+def share_from_source(signal: Floats, made: Floats) -> tuple[float, float]:
+    """Return the share of a signal's white noise that comes from its source, and the rest.
+
+    The share is of the noise's power, 0 to 1, the rest an rms. `made` is the signal computed with
+    the noise of its source; delays and filters of the source over some frames are allowed for.
+    """
+    noise, source = np.diff(signal, 4)[SHORT_FRAMES:], np.diff(made, 4)
+    delayed = np.column_stack(
+        [source[SHORT_FRAMES - k : len(source) - k] for k in range(SHORT_FRAMES)]
+    )
+    left = noise - delayed @ np.linalg.lstsq(delayed, noise, rcond=None)[0]
+    power = float(noise @ noise)
+    share = 1.0 - float(left @ left) / power if power > 0.0 else 0.0
+    rest = float(np.sqrt(np.mean(left**2) / 70.0))
+    return share, max(rest, rounding(signal, float(np.sqrt(power / len(noise) / 70.0))))
+
+
+def share_in_response(force: Floats, answer: Floats) -> float:
+    """Return the share of a force's high-frequency power that its response shows, 0 to 1.
+
+    A response shows what is signal in the force, not noise. Fourth differences of the force are
+    regressed on those of the response about the same frame, without a model between them.
+    """
+    rough, shown = np.diff(force, 4)[(FEW_FRAMES // 2) : -(FEW_FRAMES // 2)], np.diff(answer, 4)
+    last = len(shown) - 2 * (FEW_FRAMES // 2)
+    near = np.column_stack([shown[k : k + last] for k in range(2 * (FEW_FRAMES // 2) + 1)])
+    left = rough - near @ np.linalg.lstsq(near, rough, rcond=None)[0]
+    power = float(rough @ rough)
+    return 1.0 - float(left @ left) / power if power > 0.0 else 0.0
+
+
+@dataclass(frozen=True)
+class Drive:
+    """A signal that drives a stage: as recorded, as used for input, its noise and its rests."""
+
+    recorded: Floats
+    smooth: Floats
+    noise: Noise
+    rest: Rest
+
+    @classmethod
+    def of(cls, signal: Floats, noise: Noise) -> Drive:
+        """Return a signal smoothed, and held constant at rest; unchanged if it has no noise.
+
+        It is also unchanged if the smoother would remove far more than its noise, since that is
+        signal, for example of a hand that moves in steps.
+        """
+        rest = rest_of(signal, noise)
+        smooth = rest.held(smoothed(signal, noise)) if noise.rms else signal
+        made = cls(signal, smooth, noise, rest)
+        taken = float(np.sqrt(np.mean((signal - smooth) ** 2)))
+        return made.unsmoothed(noise) if taken > SIGMAS * noise.rms else made
+
+    def unsmoothed(self, noise: Noise) -> Drive:
+        """Return the signal as recorded, without smoothing."""
+        none = np.zeros(len(self.recorded))
+        return replace(self, smooth=self.recorded, noise=noise, rest=Rest(none, none))
+
+    def with_error(self, k: int) -> Floats:
+        """Return the signal with a sample of its error, number k; shape (frames,)."""
+        if self.smooth is self.recorded:
+            return unsmoothed(self.smooth, k, self.noise)
+        error = with_error(self.smooth, k, self.noise) - self.smooth
+        return self.smooth + self.rest.with_error(error, np.random.default_rng([43, k]))
+
+    def passed(self, rng: np.random.Generator) -> Floats:
+        """Return a sample of the noise that passes the smoother, shape (frames,)."""
+        sample = self.noise.sample(len(self.recorded), rng)
+        return self.rest.beside(Smoother.of(self.recorded, noise=self.noise).smooth(sample))

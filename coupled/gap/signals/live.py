@@ -26,7 +26,18 @@ from scipy.interpolate import CubicSpline
 from scipy.ndimage import median_filter
 
 from coupled.errors import InputError
-from coupled.gap.thresholds import SHORTEST_RECORD_s
+from coupled.gap.thresholds import (
+    MOST,
+    NEGLIGIBLE,
+    TINY,
+    BRIDGED_s,
+    BRIEF_s,
+    LEAD_s,
+    SETTLE_s,
+    SHORTEST_RECORD_s,
+    STRETCH_s,
+    WINDOW_s,
+)
 from coupled.record.channels import (
     CONTROL_NAMES,
     FADED,
@@ -48,18 +59,9 @@ MEASURED = ("force", "computed", "deflection")
 
 # Samples with a gap of three frames at 120 Hz still represent signals below 15 Hz; a hand moves a
 # control below 5 Hz.
-BRIDGED_s = 0.025
 # After a restart from a measured state, errors of that state decay: the slowest of the shipped
 # loaders has a time constant of 0.11 s, and the state is measured to within its noise.
-SETTLE_s = 0.2
-LEAD_s = 0.05  # samples before a restart, from which the initial rate is estimated
-LEAST_s = 0.5  # a shorter stretch is not judged
-SHORTEST_s = 2.5  # of all stretches together: half of the shortest record
 # A clock whose rate differs more from the host's is not used; crystals differ by 1e-4.
-CLOCK_RATE = 0.01
-CLOCK_WINDOW_s = 1.0  # of the running median of the clocks' difference
-LEAST_STEP = 1e-3  # frames; samples nearer together are one
-CLOCK_STEP = 0.5  # frames; a missed deadline delays all later frames by whole frames
 
 
 @dataclass(frozen=True)
@@ -138,10 +140,10 @@ def judged_part(record: Record, file: object) -> Record:
     frame_s = float(np.median(np.diff(record.time_s)))
     rows = np.flatnonzero(live.judged)
     whole = 0 if not rows.size else int(rows[-1]) + 1
-    if frame_s * len(rows) < SHORTEST_s or frame_s * whole < SHORTEST_RECORD_s:
+    if frame_s * len(rows) < STRETCH_s or frame_s * whole < SHORTEST_RECORD_s:
         problem = (
             f"holds {frame_s * len(rows):.1f} s in which the loader can be judged, the last at"
-            f" {frame_s * whole:.1f} s; {SHORTEST_s:g} s are needed, and {SHORTEST_RECORD_s:g} s of"
+            f" {frame_s * whole:.1f} s; {STRETCH_s:g} s are needed, and {SHORTEST_RECORD_s:g} s of"
             " record"
         )
         raise InputError(
@@ -198,7 +200,7 @@ def _stretches(usable: Mask, jumps: Mask, frame_s: float) -> tuple[Mask, Mask]:
     lead, settle = round(LEAD_s / frame_s), round(SETTLE_s / frame_s)
     for run in _runs(usable, jumps):
         begun = run.start + lead + settle if run.start else 0
-        if run.stop - begun < LEAST_s / frame_s:
+        if run.stop - begun < WINDOW_s / frame_s:
             continue
         judged[begun : run.stop] = True
         if run.start:
@@ -221,16 +223,16 @@ class _Clock:
             return
         time, own = record.time_s[rows], record[LOADER_TIME][rows]
         rate = float(np.median(np.diff(own) / np.diff(time)))
-        if not abs(rate - 1.0) < CLOCK_RATE:
+        if not abs(rate - 1.0) < NEGLIGIBLE:
             self.problem = f"The loader's clock runs {rate:.3g} times as fast as the host's"
             return
         away = (own - time) / frame_s
-        window = 2 * round(0.5 * CLOCK_WINDOW_s / frame_s) + 1
+        window = 2 * round(0.5 * BRIEF_s / frame_s) + 1
         usual = median_filter(away, window, mode="nearest")
-        cuts = np.concatenate(([False], np.abs(np.diff(usual)) > CLOCK_STEP))
+        cuts = np.concatenate(([False], np.abs(np.diff(usual)) > MOST))
         self.jumps[rows[cuts]] = True
         for part in _runs(np.ones(len(rows), dtype=bool), cuts):
-            near = np.abs(away[part] - usual[part]) < CLOCK_STEP
+            near = np.abs(away[part] - usual[part]) < MOST
             if not near.any():
                 continue
             # The clocks drift apart linearly; a short stretch does not determine the slope.
@@ -247,8 +249,8 @@ class _Clock:
         if len(rows) < 4:
             return signal
         before = np.maximum.accumulate(self.at[rows])[:-1]
-        rows = rows[np.concatenate(([True], self.at[rows][1:] > before + LEAST_STEP))]
-        moved = np.abs(self.at[rows] - rows).max() > LEAST_STEP
+        rows = rows[np.concatenate(([True], self.at[rows][1:] > before + TINY))]
+        moved = np.abs(self.at[rows] - rows).max() > TINY
         if received.all() and len(rows) == len(signal) and not moved:
             return signal
         at, frames = self.at[rows], np.arange(len(signal))

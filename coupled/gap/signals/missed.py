@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.gap.signals.output import Floats, Output
-from coupled.gap.thresholds import CHANCE_STEP, HELD_OFF, REPEATS_ELSE
+from coupled.gap.thresholds import FAR_SIGMAS, FEW, MORE
 from coupled.record.channels import CONTROL_NAMES, ControlName, channel
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
@@ -109,9 +109,9 @@ def _lively(gradient: Floats, both: Mask) -> bool:
     """Tell whether a gradient repeats only in missed frames, and its steps exceed its rounding."""
     moves = np.abs(np.diff(gradient))
     moves = moves[moves > 0.0]
-    if not moves.size or moves.min() > CHANCE_STEP * np.median(moves):
+    if not moves.size or moves.min() > FEW * np.median(moves):
         return False
-    return int(np.sum(_repeats(gradient))) <= REPEATS_ELSE * int(np.sum(both)) + 1
+    return int(np.sum(_repeats(gradient))) <= MORE * int(np.sum(both)) + 1
 
 
 def _off_arithmetic(record: Record, both: Mask) -> Mask:
@@ -127,5 +127,5 @@ def _off_arithmetic(record: Record, both: Mask) -> Mask:
         fresh = ~both
         left = bent - columns @ np.linalg.lstsq(columns[fresh], bent[fresh], rcond=None)[0]
         usual = float(np.median(np.abs(left[fresh])))
-        off |= np.abs(left) > HELD_OFF * max(usual, 1e-12)
+        off |= np.abs(left) > FAR_SIGMAS * max(usual, 1e-12)
     return off

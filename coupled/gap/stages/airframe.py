@@ -30,7 +30,7 @@ from coupled.gap.stages.openloop import Between, Flown, Moved, flown_in, fly_ope
 from coupled.gap.stages.shots import SLOW, Restarts, States
 from coupled.gap.stages.surfaces import flown_by, moved, surface_channel, surface_points
 from coupled.gap.stages.trim import Trim, trim_of
-from coupled.gap.thresholds import FLIGHT_KNOWN, SHOT_KNOWN, SHOT_TRIES, UNTRIMMED
+from coupled.gap.thresholds import FAR, KNOWN, SHOT_KNOWN, SHOT_TRIES
 from coupled.record.channels import LATERAL, ControlName, channel, motion_channels
 from coupled.record.record import Record
 from coupled.rig.parameters import Flight
@@ -214,7 +214,7 @@ def airframe_outputs(
         noise = left_noise(
             estimate_noise(record[name]), record[name], record[name] - flown.motion[:, i]
         )
-        own = float(np.hypot(noise.rms, FLIGHT_KNOWN * np.ptp(record[name])))
+        own = float(np.hypot(noise.rms, KNOWN * np.ptp(record[name])))
         moved_by = float(np.sqrt(np.mean(carried[:, i] ** 2 + unknown[:, i] ** 2)))
         floor = float(np.hypot(own, moved_by))
         loose = spread([carried[:, i]], own, noise.memory, rig.frame_rate)
@@ -223,7 +223,7 @@ def airframe_outputs(
             assert other.flight is not None
             made = model.flown(other)
             if made is None:
-                return record[name] + UNTRIMMED * floor
+                return record[name] + FAR * floor
             late = other.flight.motion_stamp * other.frame_rate
             return stamped(np.asarray(made.motion[:, i]), late)
 
@@ -255,7 +255,7 @@ def _slow_outputs(model: Model, wrong: Sequence[Moved], number: int) -> list[Out
             assert other.flight is not None
             made = model.shots(other)
             if made is None:
-                return record[name] + UNTRIMMED * floor
+                return record[name] + FAR * floor
             return stamped(np.asarray(made[:, i]), other.flight.motion_stamp * rate_Hz)
 
         given = (record[name], predict, floor, rate_Hz, number, loose, moved_by / floor)
@@ -288,7 +288,7 @@ def _trim_output(model: Model, record: Record, trim: Trim, number: int) -> Outpu
 
     def predict(rig: Rig) -> Floats:
         made = model.flown(rig)
-        place = trim.measured + UNTRIMMED * floor if made is None else made.trim[at]
+        place = trim.measured + FAR * floor if made is None else made.trim[at]
         return np.full(len(position), place)
 
     rate_Hz = model.rig.frame_rate

@@ -17,7 +17,7 @@ from coupled.gap.signals.output import Output
 from coupled.gap.stages.airframe import RATE
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_channel, surface_points
-from coupled.gap.thresholds import OTHER_RATE
+from coupled.gap.thresholds import TINY
 from coupled.record.channels import LATERAL, LONGITUDINAL, TIME
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
@@ -77,7 +77,7 @@ def at_rate_of(rig: Rig, record: Record) -> Rig:
     """Return the rig with the frame rate of a record, and steps per frame to match its own."""
     assert rig.flight is not None
     rate_Hz = 1.0 / float(np.median(np.diff(record.time_s)))
-    if abs(rate_Hz / rig.frame_rate - 1.0) <= OTHER_RATE:
+    if abs(rate_Hz / rig.frame_rate - 1.0) <= TINY:
         return rig
     wanted = rig.frame_rate * rig.flight.steps_per_frame / rate_Hz
     steps = max(1, math.ceil(wanted - 0.01))

@@ -24,44 +24,43 @@ from numpy.typing import NDArray
 
 from coupled.gap.noise.noise import Noise, between_jumps, jumps
 from coupled.gap.noise.smooth import rate_of, smoothed
-from coupled.gap.signals.conditions import reach_of, trim_shift
-from coupled.gap.signals.driven import Drive
+from coupled.gap.signals.conditions import asked, left, reach_of, services, trim_shift
 from coupled.gap.signals.drives import drifts
 from coupled.gap.signals.floors import (
+    Drive,
     given_noise,
     left_noise,
     noise_in,
     remove_projection,
+    share_from_source,
+    share_in_response,
     with_error,
 )
 from coupled.gap.signals.live import Mask
 from coupled.gap.signals.output import HiddenGap, Output, Predict, estimate_noise, spread
 from coupled.gap.signals.reading import Reading
-from coupled.gap.signals.served import asked, left, services
-from coupled.gap.signals.shared import share_from_source, share_in_response
-from coupled.gap.stages.compensated import compensated
-from coupled.gap.stages.imposed import Imposed
-from coupled.gap.stages.openloop import about
-from coupled.gap.stages.product import Product
-from coupled.gap.stages.ratchet import (
+from coupled.gap.stages.host import Product, compensated
+from coupled.gap.stages.inputs import (
     Driven,
+    Imposed,
+    Series,
     creeps,
     without_backlash_creep,
     without_friction_creep,
 )
-from coupled.gap.stages.series import Series
+from coupled.gap.stages.openloop import about
 from coupled.gap.stages.surfaces import filed_trim
 from coupled.gap.stages.trim import trim_of
 from coupled.gap.thresholds import (
-    BROAD,
-    HALF_RESPONDED,
-    NOISE_TRIES,
+    KNOWN,
+    MOST,
+    NEARLY_ALL,
     REPLAY_KNOWN,
-    RESPONDED,
     ROUNDING_SPAN,
-    SOURCE_SHARE,
-    SURFACE_KNOWN,
-    RESTART_s,
+    SAMPLED,
+    SMALL,
+    TRIES,
+    PIECE_s,
 )
 from coupled.parallel import in_threads
 from coupled.rig.hosted import Hosted
@@ -77,7 +76,6 @@ from coupled.rig.serving import held_force
 
 Floats = NDArray[np.float64]
 STEPPED = ("loader", "linkage")  # stages that run at the loader's own steps
-SAMPLED = 47  # seed of the noise with which creep is tested
 
 
 class DrivenBy(NamedTuple):
@@ -147,7 +145,7 @@ class Reader(Reading):
         """
         base = predict(self.rig)
         own = left_noise(own, measured, remove_projection(measured - base, correlated), judged)
-        tries = in_threads(lambda k: noisy(self.rig, k) - base, range(NOISE_TRIES))
+        tries = in_threads(lambda k: noisy(self.rig, k) - base, range(TRIES))
         carried = _rms(np.array(tries))
         known = REPLAY_KNOWN * float(np.ptp(measured))
         floor = math.hypot(own.rms, carried, driven_by.between, known)
@@ -182,7 +180,7 @@ class Reader(Reading):
             return replay_schedule(rig, self.control, q, missed=missed) * left(self)
 
         share, rest = share_from_source(gradient[ran], predict(self.rig, pressure)[ran])
-        if share > SOURCE_SHARE:
+        if share > SMALL:
             # G_T contains the noise of the recorded q̄, so the host computed it from that q̄.
             def as_read(rig: Rig) -> Floats:
                 return predict(rig, pressure)
@@ -204,7 +202,7 @@ class Reader(Reading):
             self.channel_noise("computed"),
         )
         leaks = [Nodes(smoothed(other)) for other in self.partner()]
-        every = self._restarts(round(RESTART_s * self.rig.frame_rate))
+        every = self._restarts(round(PIECE_s * self.rig.frame_rate))
         restarted = drifts(self.rig, self.control, float(np.min(gradient)))
         own_starts = every if restarted else self._restarts()
 
@@ -247,7 +245,7 @@ class Reader(Reading):
             return self._judged(walked if walks else lambda rig: at(rig, 0.0), computed)
 
         def noisy(rig: Rig, k: int) -> Floats:
-            seen = with_error(smooth, k + NOISE_TRIES, sensor)
+            seen = with_error(smooth, k + TRIES, sensor)
             return predicted(driven(force.with_error(k), seen), 2.0**0.5)(rig)
 
         force = self._without_answered_noise(force, computed)
@@ -282,14 +280,14 @@ class Reader(Reading):
 
     def _without_answered_noise(self, force: Drive, answer: Floats) -> Drive:
         """Return a broadband force with the noise reduced to what its response does not show."""
-        if force.noise.rms <= BROAD * float(np.std(force.recorded)):
+        if force.noise.rms <= SMALL * float(np.std(force.recorded)):
             return force
         share = share_in_response(force.recorded, answer)
         less = float(np.sqrt(max(1.0 - share, 0.0)))
         level = replace(force.noise, rms=force.noise.rms * less)
-        if share > RESPONDED:
+        if share > NEARLY_ALL:
             level = given_noise(self.rig, self.name_of("force"), force.recorded)
-        return replace(force, noise=level) if share <= HALF_RESPONDED else force.unsmoothed(level)
+        return replace(force, noise=level) if share <= MOST else force.unsmoothed(level)
 
     def _series(self) -> list[Output]:
         """Return the grip's motion under the force, for records without δc."""
@@ -338,7 +336,7 @@ class Reader(Reading):
             )
 
         def noisy(rig: Rig, k: int) -> Floats:
-            pulled = force.with_error(k + NOISE_TRIES)
+            pulled = force.with_error(k + TRIES)
             return driven(command.with_error(k), pulled)(rig)
 
         given, predict = (command.smooth, force.smooth), driven(command.smooth, force.smooth)
@@ -382,7 +380,7 @@ class Reader(Reading):
         # The host's noise is in δ̂ and moves the surface, so the floor is the sensor's noise.
         left = measured - position(command)
         own = left_noise(estimate_noise(left), measured, left)
-        floor = float(np.hypot(own.rms, SURFACE_KNOWN * np.ptp(measured)))
+        floor = float(np.hypot(own.rms, KNOWN * np.ptp(measured)))
         return [self._output("surface", self.surface, measured, predict, floor)]
 
 

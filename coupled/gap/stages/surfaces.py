@@ -22,13 +22,7 @@ from coupled.gap.signals.conditions import trim_shift
 from coupled.gap.signals.floors import left_noise
 from coupled.gap.signals.output import estimate_noise
 from coupled.gap.stages.openloop import Moved, Points, about
-from coupled.gap.thresholds import (
-    HALF_RESPONDED,
-    SURFACE_SHAKE,
-    SURFACE_GUST_m_per_s,
-    SURFACE_MOVES_rad,
-    SURFACE_SHAKE_s,
-)
+from coupled.gap.thresholds import KNOWN, MOST, SMALL, BRIEF_s, SURFACE_GUST_m_per_s
 from coupled.record.channels import (
     CONTROL_NAMES,
     SURFACES,
@@ -90,13 +84,13 @@ def _moves_itself(
     Also true if it still moves one frame after its own command, as with an actuator in the model.
     """
     at = motion_channels(controls, flown=True).index(surface_channel(control))
-    own, frames = controls.index(control), round(SURFACE_SHAKE_s * rate_Hz)
+    own, frames = controls.index(control), round(BRIEF_s * rate_Hz)
 
     def goes(moved: int) -> list[float]:
         """Return the surface position frame by frame while one control is held off neutral."""
         places = []
         for _ in range(frames):
-            first, second, third = (SURFACE_SHAKE * (i == moved) for i in range(3))
+            first, second, third = (SMALL * (i == moved) for i in range(3))
             airframe.step((first, second, third))
             places.append(airframe.motion()[at])
         return places
@@ -106,7 +100,7 @@ def _moves_itself(
     left_alone = goes(-1) + [place for i in range(len(controls)) if i != own for place in goes(i)]
     led = goes(own)
     moved = [*(place - still for place in left_alone), *(place - led[0] for place in led)]
-    return max(map(abs, moved)) > SURFACE_MOVES_rad
+    return max(map(abs, moved)) > KNOWN
 
 
 def filed_trim(rig: Rig, control: ControlName) -> float:
@@ -162,7 +156,7 @@ def moved(
         step = np.where(np.arange(len(position)) > 0, jump, 0.0)
         left = position - _led(rig, record, control, trim)
         level = left_noise(estimate_noise(position), position, left)
-        if float(np.std(left)) < HALF_RESPONDED * estimate_noise(position).rms:
+        if float(np.std(left)) < MOST * estimate_noise(position).rms:
             # The command explains its roughness, so that is motion of the surface, not noise.
             smooth, error = position, level.sample(len(position), rng)
             error *= min(1.0, float(np.std(left)) / max(level.rms, 1e-300))

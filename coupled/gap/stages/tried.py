@@ -29,11 +29,11 @@ from coupled.gap.stages.stages import Reader
 from coupled.gap.thresholds import (
     LATERAL_MOVES,
     MISMATCH,
-    PLAY_LEAST,
     PLAYS,
-    PLAYS_ALIKE,
     REACHED_BEYOND,
     REACHED_OVER,
+    REPLAY_KNOWN,
+    SMALL,
 )
 from coupled.record.channels import LATERAL, ControlName, channel, unit_of
 from coupled.record.record import Record
@@ -191,11 +191,11 @@ def _plays(
 
     found = []
     for i in range(2):
-        rough = np.geomspace(PLAY_LEAST * travel, travel, PLAYS).tolist()
+        rough = np.geomspace(REPLAY_KNOWN * travel, travel, PLAYS).tolist()
         best = min(rough, key=lambda play: left(play)[i])
         fine = (best * np.linspace(0.75, 1.3, PLAYS)).tolist()
         found.append(min(fine, key=lambda play: left(play)[i]))
-    alike = abs(found[1] - found[0]) < PLAYS_ALIKE * found[0]
+    alike = abs(found[1] - found[0]) < SMALL * found[0]
     return [{number.name: play} for play in found[: 1 if alike else 2]]
 
 

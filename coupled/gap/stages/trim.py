@@ -34,13 +34,13 @@ from coupled.gap.stages.surfaces import (
 )
 from coupled.gap.thresholds import (
     FIRST_ROWS,
+    PARTLY,
+    RIVAL_GAIN,
     TRIM_ANSWERED,
     TRIM_SIGMAS,
-    TRIM_SINCE,
-    TRIM_STILL,
-    TRIM_FLIGHT_s,
+    BRIEF_s,
+    FLIGHT_s,
     TRIM_LAGS_s,
-    TRIM_s,
 )
 from coupled.record.channels import ControlName, channel
 from coupled.record.record import Record
@@ -73,7 +73,7 @@ def trim_of(rig: Rig, record: Record, control: ControlName) -> Trim | None:
     own, noise, first = own_trim(rig, control), white(record[name]), float(record[name][0])
     off = _standing_off(rig, record, control)
     if off is None:  # by the rows before it moves
-        start, error = _start_of(record[name][: max(2, round(TRIM_s * rig.frame_rate))], noise)
+        start, error = _start_of(record[name][: max(2, round(BRIEF_s * rig.frame_rate))], noise)
         at = own if abs(start - own) <= TRIM_SIGMAS * error else start
         return Trim(at, start, error)
     standing, error = off
@@ -82,7 +82,7 @@ def trim_of(rig: Rig, record: Record, control: ControlName) -> Trim | None:
     there = own + standing
     evidence = ((first - own) ** 2 - (first - there) ** 2) / max(noise, 1e-12) ** 2
     flown = _followed(rig, record, control, own, there) if control == "column" else None
-    in_trim = evidence > TRIM_SINCE if flown is None else evidence + flown > -TRIM_SINCE
+    in_trim = evidence > RIVAL_GAIN if flown is None else evidence + flown > -RIVAL_GAIN
     return Trim(there, there, error) if in_trim else Trim(own, own, noise, standing)
 
 
@@ -114,7 +114,7 @@ def _standing_off(rig: Rig, record: Record, control: ControlName) -> tuple[float
     points = surface_points(rig, control)
     if name not in record or pressure not in record or points is None:
         return None
-    rows = max(2, round(TRIM_s * rig.frame_rate))
+    rows = max(2, round(BRIEF_s * rig.frame_rate))
     served = service_rows(record, control)
     wanted = record[name] if served is None else served.asked
     asked = replay_surface(rig, control, wanted[:rows], record[pressure][:rows])
@@ -142,7 +142,7 @@ def _constant(left: Floats, ordered: Floats, noise: float) -> tuple[float, float
     apart = one - answers @ np.linalg.lstsq(answers, one)[0]  # orthogonal to the command
     known = float(apart @ apart)
     mean, alone = float(np.mean(left)), noise / math.sqrt(len(left))
-    still = np.maximum.accumulate(np.abs(ordered)) <= TRIM_STILL * abs(mean)
+    still = np.maximum.accumulate(np.abs(ordered)) <= PARTLY * abs(mean)
     count = max(1, int(still.sum()))
     at_once = abs(float(np.sum(left[still]))) > TRIM_SIGMAS * noise * math.sqrt(count)
     if known < 1e-9 * len(left):
@@ -164,7 +164,7 @@ def _followed(
 
     None if the record does not have the motion.
     """
-    rows = min(len(record), round(TRIM_FLIGHT_s * rig.frame_rate))
+    rows = min(len(record), round(FLIGHT_s * rig.frame_rate))
     short = Record(record.channels, record.data[:rows], record.manifest)
     names = [name for name in WEIGHED if name in record]
     if not names or rig.flight is None:

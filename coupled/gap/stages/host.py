@@ -1,12 +1,16 @@
-"""The multiplier's product F_mod, compared with the product of δc itself or of δc as read.
+"""What the host computes: F_mod, and the estimate of the deflection.
 
-A digital product contains the sensor noise and scale error of δc, an analog product does not. The
-part of F_mod that repeats the noise of δc (`correlated`) is therefore not the channel's own noise:
-included in the noise floor, it would hide whether the product is digital.
+F_mod is compared with the product of δc itself, or of δc as read. A digital product contains the
+sensor noise and scale error of δc, an analog product does not. The part of F_mod that repeats the
+noise of δc (`correlated`) is therefore not the channel's own noise: included in the noise floor, it
+would hide whether the product is digital.
+
+δ̂ is predicted by the host's equations, from δc and F as read.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -15,12 +19,13 @@ from numpy.typing import NDArray
 
 from coupled.gap.noise.noise import Noise
 from coupled.gap.noise.smooth import Smoother, smoothed
-from coupled.gap.signals.floors import with_error
-from coupled.gap.signals.output import Floats
+from coupled.gap.signals.conditions import neutral
+from coupled.gap.signals.floors import unsmoothed, with_error
+from coupled.gap.signals.output import Floats, Predict
 from coupled.gap.signals.reading import Reading
-from coupled.gap.signals.served import neutral
-from coupled.gap.thresholds import PRELOAD_UNSURE
-from coupled.rig.replay import replay_product
+from coupled.gap.thresholds import FAR_SIGMAS, ROUNDING_SPAN
+from coupled.rig.hosted import held_over
+from coupled.rig.replay import replay_compensation, replay_product
 from coupled.rig.rig import Rig
 
 
@@ -57,8 +62,8 @@ class Product:
         away, level = self._smooth - self._neutral, self._level.rms
         below, above, beyond = (self._made(self._neutral + k * level) for k in (-1.0, 1.0, 3.0))
         jump, rise = np.abs(above - below), np.abs(beyond - above)
-        near = np.abs(away) < PRELOAD_UNSURE * level
-        jumps = near & ((jump > PRELOAD_UNSURE * self.own.rms) | (jump > 2.0 * rise))
+        near = np.abs(away) < FAR_SIGMAS * level
+        jumps = near & ((jump > FAR_SIGMAS * self.own.rms) | (jump > 2.0 * rise))
         judged = self.reading.judged
         return np.asarray(jumps if judged is None else jumps | ~judged)
 
@@ -127,3 +132,31 @@ class Product:
         more = None if assumed is None else assumed.gradient
         place = read - self._neutral
         return replay_product(rig, of.control, place, *self._gradients, missed, more)
+
+
+def compensated(reading: Reading) -> tuple[str, Floats, Predict, float, float]:
+    """Return the channel, δ̂ as recorded, its prediction by a rig, its floor, and F's part of it, d.
+
+    The floor is the noise of δc, although the host reads the same noise, because F may be stamped
+    slightly late. If the rig's F is late, the record's noise of F may differ from the host's.
+    """
+    computed, recorded = reading.as_read("computed"), reading.as_read("force")
+    control, others = reading.control, reading.others(as_read=True)
+    assumed = reading.assumed()
+
+    def made(rig: Rig, force: Floats) -> Floats:
+        missed = reading.missed.under(rig, control)
+        made = replay_compensation(rig, control, computed, force, others, missed)
+        return made if assumed is None else made + held_over(assumed.estimate * force, missed)
+
+    def predict(rig: Rig) -> Floats:
+        return made(rig, reading.sensed(rig).as_the_host_had_it(recorded))
+
+    own = max(reading.channel_noise("computed").rms, ROUNDING_SPAN * float(np.ptp(computed)))
+    rig, carried = reading.rig, 0.0
+    if rig.controls[control].sensing.force_stamp != 0.0:
+        level, late = reading.driving("force"), reading.sensed(rig).as_the_host_had_it
+        shaken = late(unsmoothed(recorded, 0, level)), unsmoothed(late(recorded), 0, level)
+        carried = math.hypot(*(float(np.std(made(rig, f) - predict(rig))) for f in shaken))
+    floor, name = math.hypot(own, carried), reading.name_of("estimate")
+    return name, reading.signal("estimate"), predict, floor, carried

@@ -1,0 +1,263 @@
+"""Other inputs: imposed motion, loader and linkage in series, and noise that creeps.
+
+Residual noise of an input makes backlash and friction creep. A backlash keeps the extremes of its
+input. While friction holds the loader still, the smoothed δc still contains noise; each maximum of
+it moves the grip's side of the backlash. A fit then finds the backlash too large, by 1 % of 0.8 mm
+at 20 μm of noise. Friction with presliding creeps likewise while the force rests: each noise peak
+of F makes the contact slip a little. Where the force is found to rest completely it is held
+constant (`smooth`).
+
+The creep grows with the noise. The stage is replayed with as much noise again, in both signs, so
+that linear contributions cancel, and the change is extrapolated to zero noise (SIMEX: Cook and
+Stefanski, JASA 89, 1994). Noise may be too small for a creep that √2 times as much would cause.
+Then the record does not show the creep, and the correction is not applied.
+
+With imposed motion, as on a damper test bench, the force is the output. The imposed motion is that
+of the grip if recorded, else δc. The measured force is compared with the loader's reaction
+(`rig.imposed`). Structure (which bends under the measured force), servo and backlash lie between
+grip and loader.
+
+A record of F and δ without δc has loader and linkage in series:
+
+    F → loader → δc → servo, play → + bend(F) → δ
+
+The loader's response to the measured force is predicted, and drives the linkage; the predicted
+reading of the transducer at the grip is compared with the record. All effects of loader and linkage
+show in this one output. A static record gives one number only, the slope of δ over F,
+
+    dδ/dF = 1/(G_B + ΔG) + K
+
+so a bend, a gradient and a force scale are not separable. The loader's mass and damping make them
+separable if the force excites both.
+
+On a bench that imposes the motion, the grip takes up a rigid backlash on the side of the force, δ =
+x + sgn(F)·play/2 + bend(F). Within the backlash the force is zero and δ is arbitrary.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupled.gap.effects.settings import CONTACT, is_dry, most_yielding
+from coupled.gap.noise.noise import Noise
+from coupled.gap.noise.smooth import smoothed
+from coupled.gap.signals.floors import Drive, with_error
+from coupled.gap.signals.output import Floats, Predict
+from coupled.gap.signals.reading import Reading
+from coupled.gap.thresholds import CREEP_FRICTION_N, CREEP_WORSE, LESSER, SAMPLED, SIGMAS, TRIES
+from coupled.parallel import in_threads
+from coupled.record.channels import ControlName, unit_of
+from coupled.rig.hosted import Hosted
+from coupled.rig.imposed import answer_to, behind_linkage
+from coupled.rig.nodes import Nodes
+from coupled.rig.recorder import stamped
+from coupled.rig.replay import drive_series
+from coupled.rig.rig import Rig
+
+RATCHET = 1.0 / (2.0**0.5 - 1.0)  # noise of √2 times the size causes √2 times the creep
+Driven = Callable[[Rig, float], Floats]  # response of a rig with a multiple of a noise sample
+
+
+def without_backlash_creep(rig: Rig, control: ControlName, at: Driven, measured: Floats) -> Floats:
+    """Return a linkage's response without noise-induced creep of its backlash.
+
+    `at` gives the response with a multiple of a sample of input noise added; shapes (frames,).
+    """
+    loader = rig.controls[control].loader
+    if loader.play == 0.0 and loader.bend_hysteresis_share == 0.0:
+        return at(rig, 0.0)
+    return _without_creep(measured, *in_threads(partial(at, rig), (0.0, 1.0, -1.0)))
+
+
+def without_friction_creep(
+    rig: Rig, control: ControlName, at: Driven, measured: Floats, times: float = 1.0
+) -> Floats:
+    """Return a loader's response without noise-induced creep of presliding friction.
+
+    The force contains `times` the noise that the smoother passes.
+    """
+    if rig.controls[control].loader.friction_stiffness == 0.0 or not is_dry(rig, control):
+        return at(rig, 0.0)
+    return _without_creep(measured, *in_threads(partial(at, rig), (0.0, times, -times)))
+
+
+def creeps(rig: Rig, control: ControlName, at: Driven, noise: float) -> bool:
+    """Tell whether noise of the force makes presliding friction creep by more than it vibrates.
+
+    Tested with the filed friction, or a little if none is filed, and a usual presliding length.
+    `noise` is the noise of δc, rms in d.
+    """
+    loader = rig.controls[control].loader
+    level = max(loader.friction, loader.breakaway) or CREEP_FRICTION_N
+    length = LESSER * most_yielding(control)
+    changes = {} if is_dry(rig, control) else {f"controls.{control}.loader.friction_N": level}
+    key = f"controls.{control}.{CONTACT[0]}".format(d=unit_of(control))
+    yields = rig.changed({**changes, key: level / length})
+    plain, up, down = in_threads(partial(at, yields), (0.0, 1.0, -1.0))
+    shaken = np.sqrt(np.mean((0.5 * (up - down)) ** 2) + noise**2)
+    walked = np.sqrt(np.mean((plain - 0.5 * (up + down)) ** 2))
+    return bool(walked > LESSER * shaken)
+
+
+def _without_creep(measured: Floats, plain: Floats, up: Floats, down: Floats) -> Floats:
+    """Return a response without creep, from two responses with as much noise again.
+
+    The predicted creep is removed unless this increases the mean square residual. Between the two
+    shares of `CREEP_WORSE` it is removed in part. A fitted backlash absorbs a small creep, so that
+    the residual does not show it.
+    """
+    push = RATCHET * (plain - 0.5 * (up + down))
+    before, after = (float(np.mean((measured - one) ** 2)) for one in (plain, plain + push))
+    some, much = CREEP_WORSE
+    worse = after / before - 1.0 if before > 0.0 else 0.0
+    return plain + min(max((much - worse) / (much - some), 0.0), 1.0) * push
+
+
+class Imposed:
+    """The force under an imposed motion: as measured, and as predicted by a rig."""
+
+    def __init__(self, reading: Reading) -> None:
+        self._reading = reading
+        self._motion = smoothed(reading.signal(reading.imposed))
+        self._level: Noise = reading.driving(reading.imposed)
+        self._gradient = reading.gradient()
+        self._load = reading.load()
+        self._force = reading.pulled()
+        self._others = {name: smoothed(other) for name, other in reading.others().items()}
+
+    def predict(self, motion: Floats | None = None, force: Floats | None = None) -> Predict:
+        """Return the prediction for a motion as read, d at each frame; default: the record's.
+
+        `force`, N, bends the structure behind the grip; default: the record's.
+        """
+        reading = self._reading
+        moved = self._motion if motion is None else motion
+        pulled = self._force.smooth if force is None else force
+        imposed = Nodes(moved)
+
+        def at_loader(rig: Rig) -> Floats:
+            read_as = reading.sensed(rig)
+            if reading.imposed == "deflection":
+                grip, bending = moved - read_as.zero, read_as.force(pulled)
+                return behind_linkage(rig, reading.control, grip, bending, self._others)
+            nodes = imposed.of(rig)
+            return read_as.before_curve(np.asarray(nodes / read_as.scale_on_nodes(len(nodes))))
+
+        def predicted(rig: Rig) -> Floats:
+            data, true = rig.controls[reading.control], at_loader(rig)
+            answer = answer_to(rig, reading.control, true, self._gradient, self._load(rig))
+            late_s = data.sensing.force_stamp - data.loader.delay
+
+            def read(force: Floats) -> Floats:
+                curve = data.sensing.force_curve
+                force = curve.at(force) if curve.nodes else force
+                gauged = data.sensing.force_scale * force + data.sensing.force_zero
+                return stamped(gauged, late_s * rig.frame_rate)
+
+            force = read(answer.force)
+            if (answer.most > answer.least).any():
+                force = self._within_rests(force, read(answer.least), read(answer.most))
+            return self._within_jumps(force, answer.jumps) if answer.jumps.any() else force
+
+        return predicted
+
+    def _within_rests(self, predicted: Floats, least: Floats, most: Floats) -> Floats:
+        """Return a prediction that at rest is the force measured, if friction can hold it.
+
+        Beyond its noise: what friction cannot hold is a misfit.
+        """
+        held = np.clip(self._force.smooth, np.minimum(least, most), np.maximum(least, most))
+        return np.where(most != least, held, predicted)
+
+    def _within_jumps(self, predicted: Floats, jumps: NDArray[np.bool_]) -> Floats:
+        """Return a prediction with a small weight where the force jumps within a frame.
+
+        A backlash that closes within a frame gives a sample between the forces before and after.
+        Only the share `JUMP_COUNTED` of the difference counts, which still guides a fit.
+        """
+        around = np.stack((np.roll(predicted, 1), np.roll(predicted, -1)))
+        held = np.clip(self._reading.signal("force"), around.min(axis=0), around.max(axis=0))
+        return np.where(jumps, held + LESSER * (predicted - held), predicted)
+
+    def noisy(self, rig: Rig, k: int) -> Floats:
+        """Return the prediction with a sample of the error of the smoothed motion."""
+        moved = with_error(self._motion, k, self._level)
+        return self.predict(moved, self._force.with_error(k + TRIES))(rig)
+
+
+class Series:
+    """The motion of the grip under a force, as measured and as predicted by a rig."""
+
+    def __init__(self, reading: Reading, force: Drive, hosted: Hosted) -> None:
+        self._reading, self.force, self._hosted = reading, force, hosted
+        self._gradient, self._second = reading.gradient(), reading.second()
+        self._load = reading.load()
+        self._others = {name: smoothed(other) for name, other in reading.others().items()}
+        self._leaks = [Nodes(smoothed(other)) for other in reading.partner()]
+        self._trembling = force.passed(np.random.default_rng(SAMPLED))
+        self._trembling_nodes = Nodes(self._trembling)
+        self._walks: bool | None = None
+
+    def _driven(self, force: Floats) -> Driven:
+        """Return the response to a force, N at the frames, plus a multiple of its noise."""
+        reading, nodes = self._reading, Nodes(force)
+
+        def at(rig: Rig, times: float) -> Floats:
+            sensed = reading.sensed(rig)
+            pull = sensed.force_on_nodes(nodes.of(rig), force)
+            bending = sensed.force(force)
+            if times:
+                pull = pull + times * self._trembling_nodes.of(rig)
+                bending = bending + times * self._trembling
+            if self._leaks and (share := rig.controls[reading.control].loader.crosstalk):
+                pull = pull + share * self._leaks[0].of(rig)
+            host = self._hosted._replace(missed=reading.missed.under(rig, reading.control))
+            driven_by = (pull, self._gradient, bending, self._load(rig), self._second)
+            read = drive_series(rig, reading.control, *driven_by, host, self._others)
+            return sensed.zero + read
+
+        def taken_up(rig: Rig, times: float) -> Floats:
+            loader = rig.controls[reading.control].loader
+            if loader.play == 0.0 or loader.play_stiffness > 0.0:
+                return at(rig, times)
+            key = f"controls.{reading.control}.loader.play_{unit_of(reading.control)}"
+            held, half = at(rig.changed({key: 0.0}), times), 0.5 * loader.play
+            true = reading.sensed(rig).force(force)
+            free = np.clip(reading.signal("deflection"), held - half, held + half)
+            acts = np.abs(true) > SIGMAS * self.force.noise.rms
+            return np.where(acts, held + half * np.sign(true), free)
+
+        return taken_up if reading.by_hand else at
+
+    def _predicted(self, force: Floats, times: float) -> Predict:
+        reading, at = self._reading, self._driven(force)
+        measured = reading.signal("deflection")
+
+        def predicted(rig: Rig) -> Floats:
+            loader = rig.controls[reading.control].loader
+            ratchets = loader.play > 0.0 and not reading.by_hand
+            if ratchets or loader.bend_hysteresis_share:
+                return without_backlash_creep(rig, reading.control, at, measured)
+            if self._walks:
+                return without_friction_creep(rig, reading.control, at, measured, times)
+            return at(rig, 0.0)
+
+        return predicted
+
+    def predict(self, own: Noise) -> Predict:
+        """Return the prediction of δ as read, in d at each frame; `own` is the noise of δ."""
+        force = self.force
+        if self._walks is None:
+            answer = self._driven(force.smooth)
+            walks = force.smooth is not force.recorded
+            given = (self._reading.rig, self._reading.control, answer, own.rms)
+            self._walks = walks and creeps(*given)
+        return self._predicted(force.smooth, 1.0)
+
+    def noisy(self, rig: Rig, k: int) -> Floats:
+        """Return the prediction with sample number k of the error of the smoothed force."""
+        return self._predicted(self.force.with_error(k), 2.0**0.5)(rig)
