@@ -207,7 +207,6 @@ LATERAL_MOVES = 1.5  # error rate: rms over noise, above which a lateral channel
 PUSHED = 2.0  # error rate: rms of a force over its noise, above which a control is pushed; chosen
 SHOT_s = 5.0  # step: between restarts; longer than the short period, far below the phugoid's
 SHOT_TRIES = 3  # step: samples of the error of restarts, of which each segment has one; chosen
-SHOT_KNOWN = 5e-4  # tolerance: numerical error with restarts, measured; the first step is coarser
 FIRST_ROWS = 12  # step: least rows before a surface moves, by which its trim is measured; chosen
 TERM_LEAST = 0.01  # tolerance: of the contract: share of its axis from which a term is freed
 

@@ -325,7 +325,7 @@ def test_an_invalid_diagnosis_is_refused(trials: Path, tmp_path: Path) -> None:
         "{",
         '{"verdict": "effect", "effects": [{}], "stages": {}}',
         '{"verdict": "effect"}',
-        '{"verdict": "no_gap", "format": 3, "effects": [], "stages": {}}',
+        '{"verdict": "no_gap", "format": 4, "effects": [], "stages": {}}',
     ):
         (trials / "answers" / "r001.json").write_text(text)
         with pytest.raises(InputError):

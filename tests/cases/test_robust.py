@@ -170,7 +170,7 @@ def test_an_old_diagnosis_that_is_damaged_is_made_again(tmp_path: Path, damage: 
     (tmp_path / "records.toml").write_text('r1 = "report-column"\n')
     [job] = jobs(tmp_path, tmp_path / "out")
     made = made_by(job)
-    known = {"record": "r1", "format": 2, "verdict": "refused", "why": "x", "stages": {}}
+    known = {"record": "r1", "format": 3, "verdict": "refused", "why": "x", "stages": {}}
     known |= {"effects": [], "rivals": [], "shrink": {}, "made": made}
     job.out.parent.mkdir()
     job.out.write_text(json.dumps(known))

@@ -20,18 +20,14 @@ from coupled.rig.rig import Rig
 from tests.support.gaps import nominal_rig
 from tests.support.joined import joined
 from tests.support.rigs import bench
+from tests.support.twin import WITHOUT_TWIN
 
 ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "coupled"
 # Modules of `gap/effects` that hold entries, where an effect's name is spelled.
 ENTRIES = ("library", "airframe", "loader", "linkage", "sensing", "frictions")
-# Effects of machines of others, which are none of the contract's, and those of an aircraft moved by
-# all controls; the blind trials have neither.
-IN_NO_TRIAL = {"gravity", "servo_delay", "servo_tuning", "servo_acceleration_limit"}
-IN_NO_TRIAL |= {"aileron_effectiveness", "rudder_effectiveness", "roll_damping", "yaw_damping"}
-IN_NO_TRIAL |= {"dihedral_effect", "directional_stability", "side_force_slope", "adverse_yaw"}
-IN_NO_TRIAL |= {"drag", "thrust", "roll_inertia", "pitch_inertia", "yaw_inertia"}
-IN_NO_TRIAL |= {"center_of_gravity"}
+# Effects of machines of others, which are none of the contract's.
+IN_NO_TRIAL = {*WITHOUT_TWIN, "servo_delay", "servo_tuning", "servo_acceleration_limit"}
 OF_A_WHEEL, WHEEL = {"gravity"}, CONTROL_NAMES[1]
 TWIN_OF = {kind.name: kind for kind in (*TWINS, *REVISION_2)}
 

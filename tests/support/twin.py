@@ -15,6 +15,12 @@ Floats = NDArray[np.float64]
 POOL = read_deck(1).rigs
 STEP_N = 20.0
 RATE_Hz = 120
+# Effects that no twin has: of a joint that turns, and of an aircraft moved by all controls.
+WITHOUT_TWIN = {
+    *("gravity", "aileron_effectiveness", "rudder_effectiveness", "roll_damping", "yaw_damping"),
+    *("dihedral_effect", "directional_stability", "side_force_slope", "adverse_yaw", "drag"),
+    *("thrust", "roll_inertia", "pitch_inertia", "yaw_inertia", "center_of_gravity"),
+}
 
 
 def alone(rig: Rig, twin: Twin, force: Floats, pressure_Pa: float = 0.0) -> Record:

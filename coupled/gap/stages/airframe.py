@@ -30,7 +30,7 @@ from coupled.gap.stages.openloop import Between, Flown, Moved, flown_in, fly_ope
 from coupled.gap.stages.shots import SLOW, Restarts, States
 from coupled.gap.stages.surfaces import flown_by, moved, surface_channel, surface_points
 from coupled.gap.stages.trim import Trim, trim_of
-from coupled.gap.thresholds import FAR, KNOWN, SHOT_KNOWN, SHOT_TRIES
+from coupled.gap.thresholds import FAR, KNOWN, SHOT_TRIES
 from coupled.record.channels import LATERAL, ControlName, channel, motion_channels
 from coupled.record.record import Record
 from coupled.rig.parameters import Flight
@@ -112,6 +112,19 @@ class Model:
         )
         return None if flown is None else flown.motion[:, 1:]
 
+    def restarted(self) -> Floats:
+        """Return the change of speed and attitude by restarts from the model's own states.
+
+        It is numerical error, and what a state that is not recorded changes.
+        """
+        assert self.rig.flight is not None and self.restarts is not None
+        flight = changed(self.rig.flight, {"motion_stamp_s": 0.0}, self.rig.name, "flight")
+        names = tuple(self.restarts.recorded)
+        plain = self.fly(flight, self.moved, channels=(RATE, *names)).motion[:, 1:]
+        states = self.restarts.rows(dict(zip(names, plain.T, strict=True)))
+        again = self.fly(flight, self.moved, restarts=states).motion[:, 1:]
+        return again - plain[:, [names.index(name) for name in SLOW]]
+
     def wrong_shots(self, wrong: Sequence[Moved], plain: Floats) -> list[Floats]:
         """Return the changes of speed and attitude by errors of surfaces, air and restarts."""
         assert self.rig.flight is not None and self.restarts is not None
@@ -137,10 +150,12 @@ class Model:
         late: float = 0.0,
         between: Between = "pchip",
         restarts: States | None = None,
+        channels: tuple[str, ...] = (),
     ) -> Flown:
         """Return the flight with the given surface motion, interpolated between the rows.
 
         `with_error` adds a sample of its error to the air, whose estimate is `late` frames late.
+        The `channels` are those compared, or speed and attitude where it restarts.
         """
         air = None
         if flight.gust_rms > 0.0 and self.air is not None and self.air.rms > 0.0:
@@ -148,7 +163,7 @@ class Model:
             moves = stamped(moves + self.air.error if with_error else moves, -late)
             air = (*moves[1:].tolist(), 0.0)  # row k + 1 holds the air over the frame before
         controls, rate_Hz = flown_by(self.rig), self.rig.frame_rate
-        channels = self.compared if restarts is None else (RATE, *SLOW)
+        channels = channels or (self.compared if restarts is None else (RATE, *SLOW))
         given = (flight, rate_Hz, controls, moved, channels, air)
         known = flown_in(self.record, controls, rate_Hz)
         between = "held" if self.rig.controls else between
@@ -241,11 +256,12 @@ def _slow_outputs(model: Model, wrong: Sequence[Moved], number: int) -> list[Out
     record, rate_Hz = model.record, model.rig.frame_rate
     shots = model.shots(model.rig)
     assert shots is not None  # the filed rig can be trimmed
-    carried = model.wrong_shots(wrong, shots)
+    carried, restarted = model.wrong_shots(wrong, shots), model.restarted()
     outputs = []
     for i, name in enumerate(SLOW):
         noise = left_noise(estimate_noise(record[name]), record[name], record[name] - shots[:, i])
-        own = float(np.hypot(noise.rms, SHOT_KNOWN * np.ptp(record[name])))
+        known = KNOWN * np.ptp(record[name])
+        own = float(np.sqrt(noise.rms**2 + known**2 + np.mean(restarted[:, i] ** 2)))
         errors = [one[:, i] for one in carried]
         moved_by = float(np.sqrt(np.mean(np.square(errors))))
         floor = float(np.hypot(own, moved_by))

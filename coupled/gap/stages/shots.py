@@ -53,7 +53,7 @@ class Restarts:
 
     def at(self, late: float = 0.0) -> States:
         """Return the states at the restarts; the motion is stamped so many frames `late`."""
-        return self._rows({name: stamped(x, -late) for name, x in self.smooth.items()})
+        return self.rows({name: stamped(x, -late) for name, x in self.smooth.items()})
 
     def wrong(self, sample: int) -> States:
         """Return the states with a sample of their error, by its number."""
@@ -63,9 +63,10 @@ class Restarts:
             noise = estimate_noise(read)
             error = Smoother.of(read).wiener_error(noise, len(read), rng)
             found[name] = self.smooth[name] + error
-        return self._rows(found)
+        return self.rows(found)
 
-    def _rows(self, each: Mapping[str, Floats]) -> States:
+    def rows(self, each: Mapping[str, Floats]) -> States:
+        """Return the states of some channels at the restarts."""
         rows = range(self.every, len(each[NEEDS[0]]), self.every)
         return {row: {name: float(values[row]) for name, values in each.items()} for row in rows}
 
