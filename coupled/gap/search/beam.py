@@ -282,7 +282,8 @@ def _fit_neighbours_of_best(beam: Beam, library: Sequence[Effect]) -> None:
     while beam.best:
         best, fitted = beam.best, beam.fits[beam.best]
         fewer = [one for one in _sets_without_one(fitted) if names_of(one[0]) not in beam.fits]
-        _fit_sets(beam, [*fewer, *_sets_with_other_law(beam, fitted, library)])
+        swapped = _sets_with_swap(beam, fitted, library)
+        _fit_sets(beam, [*fewer, *swapped, *_sets_with_other_law(beam, fitted, library)])
         for law in fitted.effects:
             if (part := _fit_with_simpler_law(beam, law)) is not None:
                 beside = _candidates(part.effects, library, {*law.shows_in})
