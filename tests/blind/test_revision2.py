@@ -34,6 +34,7 @@ def left(record: Record, twin: Twin) -> Floats:
     )
 
 
+@pytest.mark.slow
 def test_elastoplastic_friction_is_a_spring_until_it_slips() -> None:
     twin, force, x = soft(0.8)
     stiffness = FRICTION_N / TRAVEL_m + twin.get("basic_gradient")

@@ -202,6 +202,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("folder")
 def test_a_sample_of_wrong_calls_ends_in_one_line() -> None:
     made = list(wrong_calls(calls(), seed=35, more=400))

@@ -64,6 +64,7 @@ def test_a_log_of_jsbsim_shows_what_was_edited_in_its_model(tmp_path: Path) -> N
     assert improved["flight.pitch_damping"] == pytest.approx(number["value"])
 
 
+@pytest.mark.slow
 def test_a_log_of_flightgear_shows_what_was_edited_in_its_model(tmp_path: Path) -> None:
     _, rows = flown(tmp_path, {"/Cmalpha": 0.8}, 16.0)
     record, account = import_log(flightgear_log(tmp_path / "fg.csv", rows))

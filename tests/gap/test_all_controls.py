@@ -89,6 +89,7 @@ def test_one_moving_control_is_judged_with_the_airframe() -> None:
     assert found_parts(at_rest(short(), *CONTROL_NAMES)) == ([Part("column")], ())
 
 
+@pytest.mark.slow
 def test_a_control_that_a_force_does_not_move_is_named() -> None:
     held = at_rest(short(), "pedals", force=True)
     said = ("The pedals are not judged: no record moves them.",)
@@ -172,6 +173,7 @@ def test_a_healthy_record_of_three_controls_has_no_gap() -> None:
     json.dumps(table)
 
 
+@pytest.mark.slow
 def test_the_effects_of_two_parts_are_those_of_each_alone() -> None:
     found = whole(*WORN.items())
     assert found.verdict == "effect"

@@ -150,6 +150,7 @@ def airframe_floor(rig: Rig, record: Record, noise: Floats) -> tuple[float, floa
     return first.gap(rig), first.floor
 
 
+@pytest.mark.slow
 def test_coloured_noise_of_a_surface_reaches_the_airframes_floor(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

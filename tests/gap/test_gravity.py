@@ -43,6 +43,7 @@ def test_a_weight_is_tried_only_where_it_is_no_spring_with_an_offset(
     assert ("gravity" in {effect.name for effect in known}) is tried
 
 
+@pytest.mark.slow
 def test_a_record_of_three_seconds_is_judged_where_it_swings() -> None:
     found = diagnose(moved_rig(), {"r": moved(seconds=3.0, pace=2.0)}, "wheel")
     assert found.effects[0].name == "gravity"

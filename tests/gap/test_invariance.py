@@ -42,6 +42,7 @@ def play_of(found: Diagnosis) -> tuple[float, float]:
     return number.value, 0.5 * (number.high - number.low)
 
 
+@pytest.mark.slow
 def test_the_order_of_channels_changes_nothing(worn: Record) -> None:
     order = np.random.default_rng(1).permutation(len(worn.channels))
     turned = Record(tuple(worn.channels[i] for i in order), worn.data[:, order])

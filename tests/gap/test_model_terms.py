@@ -66,6 +66,7 @@ def without(record: Record, name: str) -> Record:
     return Record(tuple(record.channels[i] for i in at), record.data[:, at], record.manifest)
 
 
+@pytest.mark.slow
 def test_a_wrong_roll_damping_is_named_among_its_rivals(cessna: Rig, worn: Record) -> None:
     names = ("roll_damping", "dihedral_effect", "roll_inertia", "aileron_effectiveness")
     found = searched(cessna, worn, [BY_NAME[name] for name in names])

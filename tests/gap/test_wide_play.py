@@ -17,6 +17,7 @@ from tests.support import gaps
 PLAY = BY_NAME["surface_freeplay"]
 
 
+@pytest.mark.slow
 def test_a_play_that_swallows_the_motion_is_named_as_that_wide_or_wider(tmp_path: Path) -> None:
     """No larger one does otherwise: it was left out for an interval without ends."""
     nominal = gaps.nominal_rig(True)

@@ -65,6 +65,7 @@ def test_a_line_that_was_torn_by_a_loss_of_power_is_left_out(tmp_path: Path) -> 
         read_record(path)
 
 
+@pytest.mark.slow
 def test_a_parquet_record_grows_in_a_csv_file_beside_it(tmp_path: Path) -> None:
     flight, recording, _ = flown(path := tmp_path / "r.parquet")
     growing = recording_path(path)

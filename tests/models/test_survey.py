@@ -35,6 +35,7 @@ def test_a_model_that_trims_is_found_with_its_controls_and_rigs() -> None:
     assert found.fastest > 150.0
 
 
+@pytest.mark.slow
 def test_a_model_that_does_not_trim_has_the_reason() -> None:
     lacking = survey(chosen_model("L17"))
     assert lacking.flight is None
