@@ -130,7 +130,7 @@ def effects_of(
     """Return the effects found, the largest log-likelihood gain first.
 
     The probability of an effect falls with its credibility. It is at most `STATED_MOST`, the share
-    of correct effects among the most probable ones, and at most `UNDETERMINED_MOST` if the interval
+    of correct effects among the most probable ones, and just below `CERTAIN` if the interval
     of its size contains the neutral value.
     """
     remains = {stage.name: stage.remainder for stage in stages}
