@@ -5,15 +5,19 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from os import PathLike
 
+import numpy as np
+
 from coupled.api.records import Given, named_records
 from coupled.api.rigs import rig_given
 from coupled.arguments import public
+from coupled.errors import InputError
 from coupled.gap.checks import rig_of_manifests
 from coupled.gap.diagnose import Diagnosis
 from coupled.gap.diagnose import diagnose as diagnose_records
 from coupled.gap.nominal import fit_nominal
 from coupled.gap.nominalfit import NominalFit
 from coupled.record.channels import ControlName
+from coupled.record.record import Record
 from coupled.rig.rig import Rig
 
 
@@ -59,7 +63,16 @@ def diagnose(
     named = named_records(records)
     nominal = rig_of_manifests(named) if rig is None else rig_given(rig)
     well = None if healthy is None else named_records(healthy)
+    _check_twice([*named.items(), *(well or {}).items()])
     return diagnose_records(nominal, named, control, progress, well, terms=terms)
+
+
+def _check_twice(records: Sequence[tuple[str, Record]]) -> None:
+    """Raise InputError if two records hold the same numbers."""
+    for k, (name, record) in enumerate(records):
+        for _, other in records[:k]:
+            if record.channels == other.channels and np.array_equal(record.data, other.data):
+                raise InputError("coupled.diagnose", name, "is a duplicate: give each record once")
 
 
 @public

@@ -112,9 +112,13 @@ def swept_control(record: Record, file: Path) -> ControlName:
         if channel(name, "force") in record and channel(name, "deflection") in record
     ]
     if not found:
-        problem = "has no force and deflection of a control; its map should name both"
+        names = "column_force_N and column_deflection_m"
+        problem = f"lacks force and deflection of one control; map both, as {names}"
         raise InputError(file, "--feel", problem)
     moved = {name: float(np.ptp(record[channel(name, "deflection")])) for name in found}
+    if max(moved.values()) == 0.0:
+        problem = f"never changes: the {found[0]} is at rest, or a sensor is stuck"
+        raise InputError(file, channel(found[0], "deflection"), problem)
     away = [name for name in found if moved[name] > 0.1 * max(moved.values())]
     if len(away) > 1:
         problem = f"moves {' and '.join(away)}; give the log of a sweep of one control"
@@ -139,7 +143,10 @@ def sweep_of_record(record: Record, control: ControlName, file: Path) -> Sweep:
     deflection = np.array([np.mean(record[name][rows]) for rows in parts])
     force = np.array([np.mean(record[channel(control, "force")][rows]) for rows in parts])
     level = np.full(count, float(np.mean(pressure)))
-    found = Sweep(deflection, force, level, _motion(deflection))
+    # A mean across neutral holds the breakout of both sides, and is not used.
+    one_side = [np.min(record[name][rows]) * np.max(record[name][rows]) > 0.0 for rows in parts]
+    motion = np.where(one_side, _motion(deflection), 0.0)
+    found = Sweep(deflection, force, level, motion)
     _check(file, [int(rows[0]) + 2 for rows in parts], found)
     return found
 

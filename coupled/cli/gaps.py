@@ -340,5 +340,5 @@ def _diagnose_folder(
     print_table(out, batch_table(found), edge=True)
     say(f"diagnoses: {output}  ({len(found)}, and summary.csv)")
     if all(row.why for row in found):
-        say("no record could be diagnosed: summary.csv has the reason for each")
+        say("no record could be diagnosed: its JSON has the reason for each")
         raise typer.Exit(2)

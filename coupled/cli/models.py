@@ -73,7 +73,7 @@ def terms(
 ) -> None:
     """List the named functions of a model's aerodynamics, with axis and share of it in a flight.
 
-    A rig scales them by name in [flight.terms].
+    A rig scales them by name under flight.terms.
     """
     from coupled.cli.tables import print_table
     from coupled.surveying.terms import list_terms

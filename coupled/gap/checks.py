@@ -271,6 +271,8 @@ def _manifest_trim(flight: Flight, record: Record, file: str) -> dict[str, Any] 
     if given.get("model") != flight.model:
         problem = f"is {given.get('model')!r} in the manifest, {flight.model!r} in the rig file"
         raise InputError(file, "flight.model", f"{problem}: another rig's file?")
+    if "imported_from" in record.manifest:
+        return None  # the rig that the log was compared with at its import; its trim was not flown
     return {key: given[key] for key in TRIM_KEYS if key in given}
 
 

@@ -16,6 +16,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import TypeVar
 
+from coupled.errors import InputError
 from coupled.gap.chain import Part
 from coupled.gap.findings.answer import effects_of, incredible, settings_of, verdict_of
 from coupled.gap.findings.budget import floors_of, shrink, stage_budget
@@ -32,6 +33,7 @@ from coupled.gap.search.descent import Descent
 from coupled.gap.search.found import Choice, inseparable
 from coupled.gap.search.histories import search
 from coupled.gap.search.problem import Problem
+from coupled.gap.stages.terms import OPTION
 from coupled.parallel import in_threads, threads
 from coupled.record.channels import ControlName
 from coupled.record.record import Record
@@ -60,9 +62,16 @@ def diagnose(
     tried. Raises InputError if a record cannot be of this rig, or if no
     stage can be judged.
     """
+    if terms and rig.flight is None:
+        raise InputError(rig.name, OPTION, "the rig has no aircraft; leave it out")
     with threads(workers):
         parts, words = parts_of(rig, records, control)
         well = _of_parts(rig, healthy, list(parts)) if healthy else {}
+        used = {name for ours in well.values() for name in ours}
+        for unused in (healthy or {}).keys() - used:
+            names = ", ".join(part.name for part in parts)
+            problem = f"moves none of what is judged ({names}): is it of another machine?"
+            raise InputError(unused, "--healthy", problem)
         alone = [part.name for part in parts if healthy and part not in well]
         words += tuple(f"No healthy record moves the {n}; noise is the limit." for n in alone)
 

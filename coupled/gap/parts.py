@@ -11,6 +11,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from coupled.errors import InputError
 from coupled.gap.chain import AIRFRAME, STAGES, Part
 from coupled.gap.signals.output import Floats, estimate_noise
 from coupled.gap.signals.reading import Reading
@@ -32,6 +33,9 @@ def parts_of(
     They are the parts of one control, or of all that the rig has and the records move.
     """
     if not rig.controls:
+        if control is not None:
+            problem = f"the rig is an aircraft alone, without a {control}; leave it out"
+            raise InputError(rig.name, "--control", problem)
         return {Part("column", own=False): records}, ()
     if control is not None:
         return {Part(control): records}, ()

@@ -27,6 +27,7 @@ from coupled.rig.curves import (
 from coupled.schema import Section, derived, named, quantity, text_like
 
 # A name usable in a file name: letters, digits, dot, dash, underscore.
+TURN = 6.2832  # rad
 PLAIN_NAME = r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,79}$"
 PlainName = Annotated[
     str,
@@ -65,7 +66,7 @@ class Loader(Section):
     ripple_period: float = quantity("{d}", 0.01, gt=0)
     ripple_phase: float = quantity("rad", 0.0)
     gravity: float = quantity("N", 0.0, ge=0)
-    gravity_angle: float = quantity("rad", 0.0)
+    gravity_angle: float = quantity("rad", 0.0, ge=-TURN, le=TURN)
     relaxing_stiffness: float = quantity("N_per_{d}", 0.0, ge=0)
     relaxing_time: float = quantity("s", 1.0, gt=0)
     force_limit: float = quantity("N", 0.0, ge=0)

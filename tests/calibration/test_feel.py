@@ -8,8 +8,15 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from coupled.calibration.feel import Feel, fit_feel, read_sweep
+from coupled.calibration.feel import (
+    Feel,
+    fit_feel,
+    read_sweep,
+    sweep_of_record,
+    swept_control,
+)
 from coupled.errors import InputError
+from coupled.record.record import Record
 from coupled.rig.equations import specified_force
 from coupled.rig.rigfile import rig_from_table
 from coupled.schema import load_toml
@@ -244,4 +251,29 @@ def test_a_record_without_forces_is_no_sweep(tmp_path: Path) -> None:
     (tmp_path / "map.toml").write_text(text, encoding="utf-8")
     done = coupled(tmp_path, *IMPORT)
     assert done.returncode == 2
-    assert "has no force and deflection of a control" in " ".join(done.stderr.split())
+    assert "lacks force and deflection of one control" in " ".join(done.stderr.split())
+
+
+def both_sides(rate_Hz: float = 50.0) -> Record:
+    """Return a sweep to both sides: 500 N/m, 5 N of friction, 3 N of breakout."""
+    t = np.arange(round(40.0 * rate_Hz)) / rate_Hz
+    deflection = 0.1 * np.sin(2.0 * np.pi * t / 20.0)
+    way = np.sign(np.cos(2.0 * np.pi * t / 20.0))
+    force = 500.0 * deflection + 5.0 * way + 3.0 * np.sign(deflection)
+    return Record(
+        ("time_s", "column_force_N", "column_deflection_m"), np.column_stack((t, force, deflection))
+    )
+
+
+def test_a_sweep_across_neutral_keeps_its_breakout() -> None:
+    """Means of rows on both sides of neutral made a steep segment of it."""
+    found = fit_feel(sweep_of_record(both_sides(), "column", Path("log.csv")))
+    assert found.breakout_N == pytest.approx(3.0, abs=0.05)
+    assert found.friction_N == pytest.approx(5.0, abs=0.05)
+
+
+def test_a_control_at_rest_is_no_sweep() -> None:
+    still = both_sides().data.copy()
+    still[:, 2] = 0.0
+    with pytest.raises(InputError, match="never changes: the column is at rest"):
+        swept_control(Record(both_sides().channels, still), Path("log.csv"))

@@ -8,8 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from coupled import diagnose as judge
 from coupled import load_rig
 from coupled.errors import InputError
+from coupled.gap.checks import trimmed
 from coupled.gap.diagnose import diagnose
 from coupled.gap.findings.diagnosis import Diagnosis
 from coupled.gap.stages.airframe import airframe_outputs
@@ -21,6 +23,7 @@ from coupled.rig.rig import Rig
 from coupled.rig.rigfile import read_rig
 from tests.support.commands import coupled
 from tests.support.ownlogs import flightgear_log, flown
+from tests.support.rigs import bench
 
 
 def alone(name: str = "c172p") -> Rig:
@@ -140,3 +143,28 @@ def test_an_elevator_moved_by_control_laws_is_refused(healthy: Record) -> None:
     lacking = without(healthy, "true_airspeed_m_per_s")
     with pytest.raises(InputError, match=r"flight\.model: f16 has control laws.*controls\.column"):
         diagnose(fighter, {"log": lacking})
+
+
+def test_what_an_aircraft_alone_cannot_be_asked_is_refused(healthy: Record) -> None:
+    with pytest.raises(InputError, match="--control: the rig is an aircraft alone"):
+        diagnose(alone(), {"log": healthy}, "wheel")
+    with pytest.raises(InputError, match="log 2: is a duplicate"):
+        judge(alone(), {"log": healthy, "log 2": healthy})
+    with pytest.raises(InputError, match="is a duplicate"):
+        judge(alone(), {"log": healthy}, healthy={"well": healthy})
+
+
+def test_terms_without_an_aircraft_are_refused(healthy: Record) -> None:
+    with pytest.raises(InputError, match="--terms: the rig has no aircraft"):
+        diagnose(bench({}), {"log": healthy}, terms=True)
+
+
+def test_a_log_that_was_imported_beside_a_rig_is_trimmed_as_it_begins(tmp_path: Path) -> None:
+    """The rig of an import is what the log was compared with, not what was flown."""
+    log = Path(__file__).parents[1] / "data" / "JSBout.csv"
+    record, _ = import_log(log, None, alone())
+    manifest = {"rig": json.loads(alone().model_dump_json()), "imported_from": log.name}
+    known = Record(record.channels, record.data, manifest)
+    rig, said = trimmed(at_rate_of(alone(), known), {"log": known})
+    assert rig.flight is not None and rig.flight.calibrated_airspeed == pytest.approx(52.0, abs=1.0)
+    assert "the first rows of log" in said

@@ -34,11 +34,10 @@ _AERODYNAMIC = {f"flight.{a.part.name}" for a in ALTERATIONS if not isinstance(a
 def with_terms(library: Sequence[Effect], rig: Rig, records: Mapping[str, Record]) -> list[Effect]:
     """Return a library with the model's functions in place of effects of the aerodynamics.
 
-    Raises InputError for a rig without an aircraft, a model without named functions, and a record
-    without channels that the airframe needs.
+    Raises InputError for a model without named functions, and for a record without channels that
+    the airframe needs.
     """
-    if rig.flight is None:
-        raise InputError(rig.name, OPTION, "the rig has no aircraft; leave it out")
+    assert rig.flight is not None
     axes = functions_of(main_file(rig.flight, [aircraft_folder()], rig.name))
     if not axes:
         raise InputError(
