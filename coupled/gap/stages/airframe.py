@@ -200,11 +200,17 @@ def _was_moved(record: Record, control: ControlName) -> bool:
 
 
 def airframe_outputs(
-    rig: Rig, record: Record, number: int = 0, flights: Flights | None = None
+    rig: Rig,
+    record: Record,
+    number: int = 0,
+    flights: Flights | None = None,
+    slow: bool = False,
 ) -> list[Output]:
     """Return the airframe's outputs; empty for a bench, or if channels are missing.
 
-    `flights` is a cache of flights of the same record.
+    `flights` is a cache of flights of the same record. With `slow`, speed and pitch attitude are
+    outputs, too. A diagnosis has them for an aircraft alone only: with another lift slope, the
+    attitude of the right rig was off by 2.5 noise floors, which drew in effects that are not there.
     """
     if rig.flight is None or any(name not in record for name in needs(rig, record)):
         return []
@@ -218,7 +224,7 @@ def airframe_outputs(
     right, wrong = moved(rig, record, places, np.random.default_rng(43))
     air = vertical_air(record, 1.0 / rig.frame_rate)
     known = Flights() if flights is None else flights
-    restarts = Restarts.of(record, rig.frame_rate)
+    restarts = Restarts.of(record, rig.frame_rate) if slow else None
     model = Model(rig, record, right, compared, air, known, restarts)
     flown = model.flown(rig)
     assert flown is not None  # the filed rig can be trimmed
