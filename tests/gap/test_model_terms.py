@@ -201,7 +201,8 @@ def test_terms_that_cannot_be_tried_are_refused(cessna: Rig, worn: Record, tmp_p
             with_terms(EFFECTS, rig, {"a.csv": record})
         return str(caught.value)
 
-    assert refused(bench(), motion).endswith("--terms: the rig has no aircraft; leave it out")
+    with pytest.raises(InputError, match="--terms: the rig has no aircraft; leave it out"):
+        diagnose(bench(), {"a.csv": motion}, terms=True)
     assert refused(cessna, without(motion, "pitch_rate_rad_per_s")) == (
         "a.csv: --terms: the record lacks pitch_rate_rad_per_s, which the airframe needs"
     )
