@@ -107,10 +107,10 @@ _set_start: Any = vars(State)["_start"].__set__
 
 
 def state_reader(places: Mapping[str, int], rows: memoryview) -> Callable[[int], State]:
-    """Return a function for the state of a row, which it reads from `rows` when it is asked.
+    """Return a function that returns the state of a row; the state reads `rows` on access.
 
     So it costs little in every frame. `rows` has shape (frames, channels). Before a row changes,
-    `copy_row` gives its state numbers of its own.
+    `copy_row` copies the row into its state.
     """
     shared, width = Rows(places, rows.cast("B").cast("d")), len(places)
     new, set_rows, set_start = object.__new__, _set_rows, _set_start
@@ -125,7 +125,7 @@ def state_reader(places: Mapping[str, int], rows: memoryview) -> Callable[[int],
 
 
 def copy_row(state: State) -> None:
-    """Give a state numbers of its own, before the row that it is read from changes."""
+    """Copy a state's row into the state, before the row changes."""
     numbers = memoryview(state._own().tobytes()).cast("d")
     _set_rows(state, Rows(state._rows.places, numbers))
     _set_start(state, 0)

@@ -1,7 +1,7 @@
 """The parts of a diagnosis: the controls that the records move, and the airframe.
 
 This module alone decides which part judges the airframe. If the records move one control, its part
-does. If they move several, the airframe is a part of its own: its motion is predicted once, from
+does. If they move several, the airframe is a separate part: its motion is predicted once, from
 all measured surfaces. It is the only part of a rig without controls.
 """
 

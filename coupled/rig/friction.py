@@ -354,7 +354,7 @@ def _sliding(
     span: float,
     load: float,
 ) -> tuple[float, float]:
-    """Return the same as `sliding_speed` without a curve over the rate."""
+    """Return the result of `sliding_speed` for friction without a curve over the rate."""
     if p.dry == 0:
         return v + push / inertia, 0.0
     if p.stiffness > 0.0:

@@ -26,7 +26,7 @@ Mode = Literal["value", "factor", "added", "switch", "yields"]
 Drawing = Literal["law", "loop", "time"]
 Role = Literal["size", "other", "shape"]
 Kind = Literal["", "limit", "aliased", "saturating"]
-# The host has values of its own for these keys, which are then to be corrected.
+# The host computes with other values for these keys; they must be corrected, too.
 HOST_VALUES = {
     "loader.bend_{d}_per_N": "K̂",
     "loader.basic_gradient_N_per_{d}": "the host's G_B",

@@ -359,7 +359,7 @@ class _Fitter:
         return -0.5 * float(sums.samples @ misfit(squares))
 
     def _refined(self, made: _Made) -> _Made:
-        """Return a law fitted again about its own curve, while that improves it."""
+        """Return a law fitted again about its last curve, while the fit improves."""
         for _ in range(CURVE_ROUNDS):
             anew = self._fitted(made.law, made.basis.places, made.basis.outputs, made.values)
             if anew is None:

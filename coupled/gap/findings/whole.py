@@ -1,6 +1,6 @@
 """The diagnosis of several controls at once, and of the aircraft that they move.
 
-Each part (`Part`) has a diagnosis of its own, since the measured signals cut the chain between
+Each part (`Part`) is diagnosed alone, since the measured signals cut the chain between
 them. The verdict of the whole is that of the part that comes first in the order
 
     unexplained, ambiguous with a faulty stage, mostly, effect, ambiguous without one, no_gap
@@ -52,7 +52,7 @@ class WholeDiagnosis(Diagnosis):
 
     @classmethod
     def of(cls, parts: Sequence[PartDiagnosis], records: Mapping[str, Record]) -> WholeDiagnosis:
-        """Return the diagnosis of all parts; the airframe is the last, if it is one of its own."""
+        """Return the diagnosis of all parts; the airframe is last, if it is a separate part."""
         stages = [_placed(part, stage) for part in parts for stage in part.stages]
         stages.sort(key=lambda one: (not one.guilty, STAGES.index(one.name.rpartition(".")[2])))
         effects = [

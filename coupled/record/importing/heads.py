@@ -23,7 +23,7 @@ from coupled.record.importing.mapping import CHANNELS, Channel, Clock, Layout, L
 
 LOOKED_AT_bytes = 2**17  # of a file, which contain its head
 ANGLES = ("pitch_rad", "alpha_rad")
-JUMPS = 20.0  # chosen: times the next steps, above which a step is none of a flight
+JUMPS = 20.0  # chosen: ratio to later steps, above which the first row precedes JSBSim's trim
 LEAST_JUMP_rad = 1e-5
 # A column's name, with its channel and unit.
 _JSBSIM = {
