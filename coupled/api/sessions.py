@@ -266,8 +266,8 @@ class Session:
 
         `seed` is that of the next flight's noise, turbulence and gusts; without it, the session's.
         The aircraft of a 737, B747, T-37 or F-16 is reset, if nothing but its commands acts on it.
-        Others are loaded anew (a c172p grows by 11 kB each): JSBSim's reset does not restore the
-        hysteresis of a stall, as of a c172p, or the position of an actuator, as of an awjsra.
+        Others are loaded anew, without a leak: JSBSim's reset does not restore the hysteresis of a
+        stall, as of a c172p, or the position of an actuator, as of an awjsra.
         """
         self._check_open("reset")
         self._start(self._begun if seed is None else replace(self._begun, seed=seed))
