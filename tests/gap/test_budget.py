@@ -16,6 +16,7 @@ from coupled.gap.findings.budget import NOISE, UNEXPLAINED, _Blocks, _Weights
 from coupled.gap.findings.credibility import Credibility, Regime, _size
 from coupled.gap.findings.diagnosis import Diagnosis
 from coupled.gap.findings.flown import ChannelAgain, nearer
+from coupled.gap.thresholds import STATED_MOST
 from coupled.rig.replay import replay_linkage
 from tests.support.gaps import know_only, made, nominal_rig
 
@@ -44,7 +45,7 @@ def test_what_is_nearly_right_explains_most_and_says_what_remains(
     assert found.verdict == "mostly"
     [effect] = found.effects
     assert effect.name == "coulomb_friction"
-    assert effect.probability > 0.9
+    assert effect.probability == pytest.approx(STATED_MOST, abs=0.02)
     [friction] = effect.parameters
     assert friction.filed == 0.0
     assert friction.found == pytest.approx(6.0, rel=0.03)
