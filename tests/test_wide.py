@@ -8,7 +8,7 @@ import pytest
 
 from coupled.cli.tables import print_table
 from coupled.cli.terminal import WIDEST, SafeConsole
-from coupled.gap.nominalfit import ChannelFit
+from coupled.gap.nominal import ChannelFit
 from coupled.tables.gaps import channels_table
 from coupled.tables.table import Table
 

@@ -14,8 +14,7 @@ from coupled.errors import InputError
 from coupled.gap.checks import rig_of_manifests
 from coupled.gap.diagnose import Diagnosis
 from coupled.gap.diagnose import diagnose as diagnose_records
-from coupled.gap.nominal import fit_nominal
-from coupled.gap.nominalfit import NominalFit
+from coupled.gap.nominal import NominalFit, fit_nominal
 from coupled.record.channels import ControlName
 from coupled.record.record import Record
 from coupled.rig.rig import Rig

@@ -19,7 +19,7 @@ from coupled.record.channels import control_named
 from coupled.resources import find, shipped_rigs
 
 if TYPE_CHECKING:
-    from coupled.gap.nominalfit import NominalFit
+    from coupled.gap.nominal import NominalFit
 
 
 @app.command(

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,11 +23,10 @@ from coupled.gap.effects.effect import Effect, Parameter, Signature, touched
 from coupled.gap.effects.library import EFFECTS
 from coupled.gap.effects.linkage import SERVO
 from coupled.gap.effects.scales import Scales
-from coupled.gap.nominalfit import ChannelFit, NominalFit, Number
 from coupled.gap.prepare import readers_of
 from coupled.gap.search.case import Tell
 from coupled.gap.search.fit import fit_alone
-from coupled.gap.search.found import Fit, alike
+from coupled.gap.search.found import Alike, Fit, alike
 from coupled.gap.signals.drives import as_driven
 from coupled.gap.signals.output import Output
 from coupled.gap.stages.airframe import airframe_outputs
@@ -36,9 +35,14 @@ from coupled.gap.stages.tried import as_judged
 from coupled.gap.thresholds import FAR, LEAST_SERVO_RATIO, NEGLIGIBLE, SMALL, SERVO_START_Hz
 from coupled.record.channels import ControlName, unit_of
 from coupled.record.record import Record
+from coupled.results import TableResult, frame_of
 from coupled.rig.rig import Rig
 from coupled.schema import LARGEST, Section, file_keys
 
+if TYPE_CHECKING:
+    import polars as pl
+
+Floats = NDArray[np.float64]
 # The stage of a key by its section; keys of the loader with a prefix of `OF_LINKAGE`: linkage.
 STAGE_OF_SECTION = {
     "loader": "loader",
@@ -130,7 +134,97 @@ def _bounds(holder: Section, field: str, start: float) -> tuple[float, float]:
     return low, min(high, LARGEST)
 
 
-Floats = NDArray[np.float64]
+@dataclass(frozen=True)
+class Number:
+    """A fitted parameter: value in the file, fitted value, and half of its 95 % interval.
+
+    `half` is None if the parameter is undetermined. `least` is the lower bound.
+    """
+
+    key: str
+    filed: float
+    found: float
+    half: float | None
+    least: float = -math.inf
+    at_bound: bool = False
+
+    @property
+    def interval(self) -> tuple[float, float] | None:
+        """The 95 % interval, cut at the lower bound; None if undetermined."""
+        if self.half is None:
+            return None
+        return max(self.found - self.half, self.least), self.found + self.half
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the JSON."""
+        ends = self.interval or (None, None)
+        known = {"filed": self.filed, "found": self.found, "low": ends[0], "high": ends[1]}
+        return known | ({"at_bound": True} if self.at_bound else {})
+
+
+@dataclass(frozen=True)
+class ChannelFit:
+    """The prediction error of a channel on held-out stretches, rms in its unit.
+
+    `before` is the error with the rig file, `after` with the fitted rig, `floor` the noise floor,
+    and `moves` the standard deviation of the channel.
+    """
+
+    file: str
+    channel: str
+    before: float
+    after: float
+    floor: float
+    moves: float
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the JSON."""
+        return {
+            "record": self.file,
+            "channel": self.channel,
+            "before": self.before,
+            "after": self.after,
+            "floor": self.floor,
+            "moves": self.moves,
+        }
+
+
+@dataclass(frozen=True)
+class NominalFit(TableResult):
+    """A nominal rig fitted to records: its parameters, and which of them are not identifiable."""
+
+    control: ControlName
+    rig: Rig
+    numbers: tuple[Number, ...]
+    alike: tuple[Alike, ...]
+    channels: tuple[ChannelFit, ...]
+    doubts: tuple[str, ...] = ()  # reasons against fitted values, a sentence each
+
+    def __repr__(self) -> str:
+        doubts = f", {len(self.doubts)} doubts" if self.doubts else ""
+        known = len(self.numbers) - len(self.unknown)
+        of = f"{known} of {len(self.numbers)} numbers determined"
+        return f"NominalFit({self.rig.name}, {self.control}: {of}{doubts})"
+
+    def to_polars(self) -> pl.DataFrame:
+        """Return a row per parameter: key, filed and fitted value, and 95 % interval."""
+        return frame_of([{"key": one.key} | one.as_dict() for one in self.numbers])
+
+    @property
+    def unknown(self) -> tuple[str, ...]:
+        """The keys of undetermined parameters."""
+        return tuple(number.key for number in self.numbers if number.half is None)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the JSON."""
+        return {
+            "control": self.control,
+            "numbers": {number.key: number.as_dict() for number in self.numbers},
+            "alike": [one.as_dict() for one in self.alike],
+            "undetermined": list(self.unknown),
+            "channels": [one.as_dict() for one in self.channels],
+            "doubts": list(self.doubts),
+        }
 
 
 def fit_nominal(

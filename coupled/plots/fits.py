@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from coupled.plots.pages import BLUE, GRAY, plain
 
 if TYPE_CHECKING:
-    from coupled.gap.nominalfit import NominalFit
+    from coupled.gap.nominal import NominalFit
 
 
 def draw_fit(found: NominalFit) -> Figure:

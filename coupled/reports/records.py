@@ -7,7 +7,7 @@ import numpy as np
 from coupled.authority.compare import Flight
 from coupled.authority.figures import named, remarks
 from coupled.display import percent
-from coupled.gap.nominalfit import NominalFit
+from coupled.gap.nominal import NominalFit
 from coupled.plots.fits import draw_fit
 from coupled.plots.histories import Figure, draw_record
 from coupled.plots.saving import svg_text

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from coupled.gap.findings.diagnosis import Diagnosis
     from coupled.gap.findings.flown import ChannelAgain, EffectInFlight
     from coupled.gap.findings.proposal import EffectPower, ProposedTest
-    from coupled.gap.nominalfit import ChannelFit, Number
+    from coupled.gap.nominal import ChannelFit, Number
 
 
 def diagnosis_tables(whole: Diagnosis, power: bool, system: System = "si") -> Iterator[Table]:

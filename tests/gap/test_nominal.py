@@ -10,8 +10,7 @@ import pytest
 
 from coupled.errors import InputError
 from coupled.gap.diagnose import diagnose
-from coupled.gap.nominal import fit_nominal
-from coupled.gap.nominalfit import NominalFit
+from coupled.gap.nominal import NominalFit, fit_nominal
 from coupled.record.record import Record, read_record, write_record
 from coupled.rig.rig import Rig
 from coupled.rig.rigedit import differences, edited
