@@ -34,6 +34,14 @@ class Display(Protocol):
 
 
 @public
+class Plain:
+    """A dataclass whose JSON is its fields."""
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the JSON: the fields, without those that are None."""
+        return {name: value for name, value in vars(self).items() if value is not None}
+
+
 class Displayed:
     """Something that a notebook displays, and that has a report."""
 

@@ -17,7 +17,7 @@ from coupled.gap.signals.output import Floats, estimate_noise
 from coupled.gap.signals.reading import Reading
 from coupled.gap.stages.airframe import needs
 from coupled.gap.stages.surfaces import surface_points
-from coupled.gap.thresholds import MOVES_LEAST, MOVES_NOISE
+from coupled.gap.thresholds import DOUBLED, TINY
 from coupled.record.channels import CONTROL_NAMES, ControlName, channel
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
@@ -68,7 +68,7 @@ def parts_of(
 
 def moves(rig: Rig, record: Record, control: ControlName) -> bool:
     """Tell whether a record has a control of a rig, and moves it by more than noise."""
-    least = MOVES_LEAST * rig.controls[control].travel
+    least = TINY * rig.controls[control].travel
     return any(_beyond_noise(signal, least) for signal in _way(record, control))
 
 
@@ -106,4 +106,4 @@ def _beyond_noise(signal: Floats, least: float = 0.0) -> bool:
     spread = float(np.std(signal))
     if len(signal) < 5 or spread <= least:
         return False
-    return spread > MOVES_NOISE * estimate_noise(signal).rms
+    return spread > DOUBLED * estimate_noise(signal).rms

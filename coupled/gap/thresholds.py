@@ -29,7 +29,8 @@ ROUNDS, TRIES = 3, 4  # step: repeats that may improve a result; samples, or alt
 
 # Records that are refused (`checks`).
 OTHER_SPEED = 0.03  # tolerance of the trimmed airspeed; chosen
-SHORT_FRAMES = 12  # step: a tenth of a second at 120 Hz, before a motion changes; chosen
+SHORT_FRAMES = 12  # step: a tenth of a second at 120 Hz, before a motion changes; and of set
+# points, the most frames between two and the least number; chosen
 FEW_FRAMES = 8  # step: in which a motion may be straight, or a rest begins; chosen
 BRIEF_s, FLIGHT_s = 1.0, 15.0  # step: of a trim at a record's start; of a test flight. With 15 s
 # the offset of 26 records of a T-37 was decided right; longer, the phugoid's own error decided
@@ -42,8 +43,7 @@ SETTLE_s, LEAD_s = 0.2, 0.05
 # Noise and rounding of a channel (`noise`).
 ROUNDING_SPAN = 1e-6  # tolerance: of a channel's span, the least resolution of a file; chosen
 NOISE_FROM = 0.4  # prior: of the Nyquist frequency, above which is noise alone; chosen
-LINE_BANDS = 8  # step: bands there; chosen
-WHITE_FRAMES = 400  # step: frames; fewer are too few for bands; chosen
+WHITE_FRAMES = 400  # step: frames; with fewer the colour is not estimated; chosen
 COLOURS = tuple(0.02 * k for k in range(43))  # step: lag-one correlations, to 0.84
 PIECE = 64  # step: frames of a spectrum; chosen
 QUIET_SHARE = 0.3  # step: of the quieter pieces; 0.5 includes pieces in which a loader sticks
@@ -56,11 +56,8 @@ STEEPNESSES = (6.0, 10.0)  # step: exponents of the decay of a signal's spectrum
 LEVELS = tuple(-4.0 + 0.25 * k for k in range(48))  # step: ln of that signal's level; chosen
 LINE_HEIGHT = 30.0  # error rate: 10⁻⁹ for 7200 frames of white noise
 TAPER_BINS = 3  # step: bins to either side that a tone fills under a Hann window
-HUM_FROM_Hz = 10.0  # prior: below it a tone is no mains hum; chosen
 MAINS_Hz = (50.0, 60.0, 400.0)  # prior: mains of the ground, and of aircraft (MIL-STD-704)
 MAINS_OFF = 0.01  # tolerance: a public grid stays within 1 % for 99.5 % of a year (EN 50160)
-REST_FRAMES = 30  # step: of a window at rest; chosen
-REST_SPREAD = 1.35  # error rate: times the noise, of the rms in a window at rest; chosen
 
 # Stretches of a record: fitted and held out (`output`, `intervals`).
 STRETCH_s = 2.5  # step: longer than a residual's memory, with enough stretches in 20 s; chosen
@@ -68,7 +65,6 @@ PIECE_s = 0.25  # step: the shortest part of it; of replays between restarts; ch
 SHORTEST_RECORD_s = 2.0 * STRETCH_s  # step: one stretch to fit and one to hold out
 LEAST_STRETCHES = 2.0  # step: for a scatter between them, and for each parameter; chosen
 LEAST_MEMORIES = 20.0  # step: correlation times of the residual in a stretch; chosen
-STRETCH_POWER = 0.125  # step: of the residual's power, above which a stretch is divided
 
 # Limits of the residual by noise alone (`output`).
 FAULTY_FROM = 1.2  # tolerance: records of the independent twin without an effect reach a gap of 1.1
@@ -76,8 +72,6 @@ SMOOTHING_LOST = 0.15  # tolerance: gap from smoothing at kinks of an input, as 
 CHANGE_CHANCE = 0.02  # error rate: by all features of a healthy record together (docs/diagnosis.md)
 
 # What drives a machine (`drives`, `tried`).
-HELD_JUMPS, HELD_AT_MOST = 20, 10  # error rate: least changes; most frames between two; chosen
-HELD_STEPS = 3.0  # prior: resolution steps of the median change; a slow sensor has one; chosen
 REACHED_BEYOND = 6.0  # error rate: times a transducer's noise, above which it moved; chosen
 REACHED_OVER = (2, 3, 4, 6, 8, 12)  # step: frames over which a speed is computed; chosen
 
@@ -102,8 +96,6 @@ PLAYS = 40  # step: plays of a scan before an imposed motion's are fitted; chose
 # Nuisance parameters of the nominal rig (`settings`, `case`).
 SETTING = 0.02  # tolerance: a potentiometer is set, and a servo tuned, to 1 or 2 %
 YIELDS_m = 5e-4  # prior: largest presliding length of friction; the contract's
-WHEEL_m = 0.1  # prior: a wheel's radius, for the same length as an angle; chosen
-MOST_ELASTIC = 0.95  # prior: largest elastic share of a contact; chosen
 LENGTHS = (0.03, 0.1, 0.3, 0.8)  # step: presliding lengths, of the largest one; and elastic
 ELASTIC_SHARES = (0.0, 0.3, 0.6, 0.9)  # shares, where the search starts; chosen
 SEARCHED_TO = 0.03  # step: its last one, relative; chosen
@@ -112,7 +104,7 @@ CLOCK_s = 5e-4  # tolerance of a recorder's time stamps; chosen
 # The scale of a machine (`scales`).
 COLUMN_FORCE_N = 20.0  # prior: RMS force; chosen
 COLUMN_WAY = {"m": 0.03, "rad": 0.3}  # prior: RMS motion of a column, a wheel; chosen
-OTHER_SCALE, BOUND_SCALES = 5.0, 3.0  # prior: from which bounds are rescaled, and reach; chosen
+OTHER_SCALE = 5.0  # prior: from which bounds are rescaled, and reach; chosen
 LIGHT_LOAD_N = 10.0  # prior: load at which friction by load sets a contact's stiffness; chosen
 SERVO_START_Hz = 20.0  # prior: amid the 8 to 30 Hz of control loaders; chosen
 
@@ -158,13 +150,10 @@ CERTAIN = 0.6  # error rate: of 6 effects of 0.6 to 0.7 in three seeds 5 were ri
 
 # When and where a gap lies (`where`, `course`).
 WINDOW_s = 0.5  # step: windows in which a residual, or a size, is estimated; chosen
-DRIVES = 3  # step: signals by which the excitation of two windows is compared; chosen
 ONSET_CHANCE = 1e-3  # error rate: of excitation alone leaving all quiet before
-COURSE_GAIN = 8.0  # error rate: log-likelihood gain of a time history over a constant; chosen
-ONSETS_s, FINE = 0.1, 61  # step: between onsets that are tried, and their number about the best
-FEWEST_WINDOWS, ENDS, BEGUN = 12, 3, 4  # step: windows of a history; its ends without onset; chosen
-NEAR_SHARE = 0.6  # error rate: power near reversals of motion; chosen
-SPECTRUM_s = 8.0  # step: length of a periodogram; chosen
+COURSE_GAIN = 8.0  # error rate: log-likelihood gain that discriminates two models; chosen
+ONSETS_s = 0.1  # step: between onsets that are tried, and half of it about the best
+ENDS, BEGUN = 3, 4  # step: windows at the ends of a history, without onset; chosen
 MOST_CHANGE = 100.0  # prior: % a minute, beyond which a rate is no drift of a machine; chosen
 
 # What a model free in form takes (`flexible`).
@@ -173,9 +162,9 @@ LAGS_s = (0.03, 0.1, 0.3, 1.0)  # step: of the copies of a signal; from reversal
 RIDGES = tuple(10.0**k for k in range(-7, 3))  # step; held-out stretches decide among them
 
 # How far a gap shrinks, what would have shown, and the next test (`budget`, `power`, `proposal`).
+MOST_PLAYERS = 5  # step: of Shapley, 32 subsets; more effects are averaged over first and last
 BOOTSTRAPS, FEW_STRETCHES = 400, 8  # step: draws of an interval; too few stretches for it; chosen
 POWER_DECADES, POWER_HALVINGS = 3, 5  # step: beside a start; of the decade that shows, to 7 %
-SEPARATED_GAIN = 10.0  # error rate: log-likelihood gain that discriminates two effects; chosen
 
 # Whether an effect is the cause (`credibility`). Set on 68 effects found in blind records of seeds
 # 101 to 103 and 301: none of 53 right ones drifts by over 0.041; of 15 wrong ones nine drift by
@@ -200,10 +189,7 @@ VERY_STRONG = 5.0  # error rate: log evidence, 2 ln B > 10 (Kass and Raftery 199
 # What moves, short records, and the airframe (`parts`, `checks`, `shots`, `surfaces`, `terms`).
 OTHER_ALTITUDE_m = 100.0  # tolerance: of the trim's altitude; 1 % of the air's density
 SHORT_SWINGS = 4  # error rate: of a short record: both halves hold motion in both directions
-MOVES_NOISE = 2.0  # error rate: least standard deviation of a motion, over the noise's; chosen
-MOVES_LEAST = 1e-3  # error rate: and over the travel of the control; chosen
 LATERAL_MOVES = 1.5  # error rate: rms over noise, above which a lateral channel moves; chosen
-PUSHED = 2.0  # error rate: rms of a force over its noise, above which a control is pushed; chosen
 SHOT_s = 5.0  # step: between restarts; longer than the short period, far below the phugoid's
 SHOT_TRIES = 3  # step: samples of the error of restarts, of which each segment has one; chosen
 FIRST_ROWS = 12  # step: least rows before a surface moves, by which its trim is measured; chosen

@@ -28,7 +28,7 @@ from coupled.gap.search.found import Candidate, Choice, Fit, Found
 from coupled.gap.signals.output import Output
 from coupled.gap.stages.terms import with_terms
 from coupled.gap.stages.tried import tried_effects
-from coupled.gap.thresholds import SEPARATED_GAIN
+from coupled.gap.thresholds import COURSE_GAIN
 from coupled.record.channels import LATERAL
 from coupled.record.record import Record
 from coupled.resources import shipped_rigs
@@ -137,7 +137,7 @@ def test_the_manoeuvre_that_separates_two_functions_moves_the_control_that_does(
     choice = Choice((step,), fits[0], fits[0], {}, ())
     best, *_ = next_tests(cessna, record, "column", choice)
     assert "on the wheel" in best.text
-    assert best.gain > SEPARATED_GAIN
+    assert best.gain > COURSE_GAIN
     assert best.rivals == (terms[0].name, terms[1].name)
 
 

@@ -20,7 +20,7 @@ import numpy as np
 from coupled.gap.effects.effect import Effect, Parameter
 from coupled.gap.noise.smooth import rate_of, smoothed
 from coupled.gap.signals.reading import Reading
-from coupled.gap.thresholds import BOUND_SCALES, COLUMN_FORCE_N, COLUMN_WAY, OTHER_SCALE
+from coupled.gap.thresholds import COLUMN_FORCE_N, COLUMN_WAY, OTHER_SCALE
 from coupled.record.channels import ControlName, unit_of
 from coupled.rig.rig import Rig
 
@@ -107,8 +107,8 @@ def _scaled(p: Parameter, scales: Scales, rig: Rig, control: ControlName) -> Par
     times, size = scales.times_columns(unit, control), scales.size(unit)
     low, high = times * p.low, times * p.high
     if unit == "N" and size is not None and not p.is_limit:
-        high = max(high, BOUND_SCALES * size)
-        low = min(low, -BOUND_SCALES * size) if low < 0.0 else low
+        high = max(high, OTHER_SCALE * size)
+        low = min(low, -OTHER_SCALE * size) if low < 0.0 else low
     if (low, high, times) == (p.low, p.high, 1.0):
         return p
     return replace(p, low=low, high=high, starts=tuple(times * start for start in p.starts))

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from coupled.gap.noise.lines import lines_in, tone_of
 from coupled.gap.noise.smooth import smoothed
 from coupled.gap.signals.output import Floats, Output
-from coupled.gap.thresholds import FEW, MORE, RIPPLE_PERIODS, TRIES, HUM_FROM_Hz
+from coupled.gap.thresholds import FEW, MORE, RIPPLE_PERIODS, TRIES
 from coupled.record.channels import ControlName, channel
 from coupled.rig.rig import Rig
 
@@ -37,8 +37,6 @@ def hums(outputs: Sequence[Output], rig: Rig, control: ControlName) -> list[dict
     for line in lines_in(first.residual(rig) * first.floor):
         seen_Hz = line.turn * first.frame_rate_Hz / (2.0 * math.pi)
         tone_Hz = tone_of(seen_Hz, first.frame_rate_Hz)
-        if tone_Hz < HUM_FROM_Hz:
-            continue
         turns = tone_Hz / first.frame_rate_Hz * 2.0 * math.pi
         # A tone aliased from an odd Nyquist zone has the opposite phase direction.
         backwards = math.cos(turns - line.turn) < math.cos(turns + line.turn)

@@ -12,7 +12,7 @@ from dataclasses import replace
 from coupled.gap.effects.effect import Effect, Parameter, Signature, setting_of
 from coupled.gap.effects.library import BY_NAME, EFFECTS, LAG
 from coupled.gap.signals.output import Output
-from coupled.gap.thresholds import MOST_ELASTIC, WHEEL_m, YIELDS_m
+from coupled.gap.thresholds import COLUMN_WAY, MINOR, YIELDS_m
 from coupled.record.channels import ControlName, unit_of
 from coupled.rig.rig import Rig
 
@@ -72,7 +72,7 @@ def contact(rig: Rig, control: ControlName) -> tuple[Effect, ...]:
         "", CONTACT[0], "yields", 1e-3 * most, most, (0.1 * most, 0.01 * most), may_end=True
     )
     share = Parameter(
-        "", CONTACT[1], "value", 0.0, MOST_ELASTIC, (loader.friction_elastic_share,), may_end=True
+        "", CONTACT[1], "value", 0.0, 1.0 - MINOR, (loader.friction_elastic_share,), may_end=True
     )
     names = ("setting of the contact", "setting of the contact's share")
     numbers = zip(names, (length, share), strict=True)
@@ -81,7 +81,9 @@ def contact(rig: Rig, control: ControlName) -> tuple[Effect, ...]:
 
 def most_yielding(control: ControlName) -> float:
     """Return the largest presliding length, d."""
-    return (YIELDS_m / WHEEL_m) if unit_of(control) == "rad" else YIELDS_m
+    return (
+        (YIELDS_m * COLUMN_WAY["rad"] / COLUMN_WAY["m"]) if unit_of(control) == "rad" else YIELDS_m
+    )
 
 
 def is_dry(rig: Rig, control: ControlName) -> bool:

@@ -31,13 +31,11 @@ from coupled.gap.effects.effect import Effect, touched
 from coupled.gap.search.case import Case
 from coupled.gap.search.found import Choice, Fit
 from coupled.gap.signals.output import Output
-from coupled.gap.thresholds import BOOTSTRAPS, FEW_STRETCHES
+from coupled.gap.thresholds import BOOTSTRAPS, FEW_STRETCHES, MOST_PLAYERS
+from coupled.results import Plain
 from coupled.rig.rig import Rig
 
 Floats = NDArray[np.float64]
-
-
-MOST_PLAYERS = 5  # chosen: 32 subsets; more are averaged over first and last
 
 
 def shapley_subsets(players: int) -> tuple[list[int], Floats]:
@@ -150,9 +148,9 @@ def stage_budget(
         [np.full(len(np.unique(o.stretches)), f) for o, f in zip(outputs, floor, strict=True)]
     )
     draws = np.random.default_rng(7).integers(0, len(noise), (BOOTSTRAPS, len(noise)))
-    weights = _Weights(players)
-    whole = weights.shares(blocks, noise, np.arange(len(noise)))
-    drawn = np.array([weights.shares(blocks, noise, pick) for pick in draws])
+    weights = shapley_weights(len(players))
+    whole = _shares(weights, blocks, noise, np.arange(len(noise)))
+    drawn = np.array([_shares(weights, blocks, noise, pick) for pick in draws])
     low, high = np.percentile(drawn, [2.5, 97.5], axis=0)
     names = [*(effect.name for effect in players), UNEXPLAINED, NOISE]
     each = [Share(n, *map(float, v)) for n, *v in zip(names, whole, low, high, strict=True)]
@@ -198,33 +196,28 @@ def _powers(
     return _Blocks(np.array(sums), np.array(frames))
 
 
-class _Weights:
-    """Shapley weights of each subset's power in each effect's share."""
+def _shares(weights: Floats, blocks: _Blocks, noise: Floats, pick: NDArray[np.intp]) -> Floats:
+    """Return the shares of the effects, of unexplained structure and of noise; sum 1.
 
-    def __init__(self, players: Sequence[Effect]) -> None:
-        self._of = shapley_weights(len(players))
-
-    def shares(self, blocks: _Blocks, noise: Floats, pick: NDArray[np.intp]) -> Floats:
-        """Return the shares of the effects, of unexplained structure and of noise; sum 1.
-
-        `noise` is the power of noise on each stretch with the effects, floors².
-        """
-        frames = blocks.frames[pick]
-        power = blocks.sums[:, pick].sum(axis=1) / frames.sum()
-        floor = min(float(noise[pick] @ frames / frames.sum()), float(power[-1]))
-        named = self._of @ power
-        if power[0] <= 0.0:  # no residual at all
-            return np.array([*(0.0 * named), 0.0, 1.0])
-        own, taken = min(floor, 1.0), float(named.sum())
-        if taken > 0.0:
-            named = named * (1.0 + (floor - own) / taken)
-        else:
-            own = floor
-        return np.asarray(np.array([*named, power[-1] - floor, own]) / power[0])
+    `weights` are those of Shapley. `noise` is the power of noise on each stretch with the effects,
+    floors². `pick` are the stretches that count.
+    """
+    frames = blocks.frames[pick]
+    power = blocks.sums[:, pick].sum(axis=1) / frames.sum()
+    floor = min(float(noise[pick] @ frames / frames.sum()), float(power[-1]))
+    named = weights @ power
+    if power[0] <= 0.0:  # no residual at all
+        return np.array([*(0.0 * named), 0.0, 1.0])
+    own, taken = min(floor, 1.0), float(named.sum())
+    if taken > 0.0:
+        named = named * (1.0 + (floor - own) / taken)
+    else:
+        own = floor
+    return np.asarray(np.array([*named, power[-1] - floor, own]) / power[0])
 
 
 @dataclass(frozen=True)
-class ChannelShrink:
+class ChannelShrink(Plain):
     """One channel's RMS residual on held-out stretches, in its own unit, and its noise floor.
 
     `closed` is (before − after)/(before − floor) with its 95 % interval; None if no effect was
@@ -240,21 +233,6 @@ class ChannelShrink:
     low: float | None = None
     high: float | None = None
     reliable: bool | None = None
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the JSON, without the keys that are None."""
-        known = {
-            "channel": self.channel,
-            "before": self.before,
-            "after": self.after,
-            "floor": self.floor,
-            "blocks": self.blocks,
-            "closed": self.closed,
-            "low": self.low,
-            "high": self.high,
-            "reliable": self.reliable,
-        }
-        return {name: value for name, value in known.items() if value is not None}
 
 
 @dataclass(frozen=True)

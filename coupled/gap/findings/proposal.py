@@ -44,11 +44,11 @@ from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points
 from coupled.gap.stages.tried import lacking_keys
 from coupled.gap.thresholds import (
+    COURSE_GAIN,
+    DOUBLED,
     MOST,
     POWER_DECADES,
     POWER_HALVINGS,
-    PUSHED,
-    SEPARATED_GAIN,
     FLIGHT_s,
     PIECE_s,
 )
@@ -250,7 +250,7 @@ def next_tests(
 def _is_pushed(record: Record, control: ControlName) -> bool:
     """Tell whether the force on a control is more than noise."""
     force = channel(control, "force")
-    return force in record and float(np.std(record[force])) > PUSHED * white(record[force])
+    return force in record and float(np.std(record[force])) > DOUBLED * white(record[force])
 
 
 def _as_flown(rig: Rig, test: Rig, control: ControlName) -> Rig:
@@ -353,7 +353,7 @@ def in_one_line(
     if tests_found:
         best = tests_found[0]
         one, other = map(plain, best.rivals)
-        if best.gain < SEPARATED_GAIN:
+        if best.gain < COURSE_GAIN:
             return (
                 f"No candidate test discriminates {one} from {other}:"
                 " this rig responds alike to both."

@@ -33,21 +33,20 @@ from coupled.gap.signals.output import Output
 from coupled.gap.thresholds import (
     BENDS,
     DOUBLED,
-    DRIVES,
     MINOR,
     MORE,
     MOST,
-    NEAR_SHARE,
     ONSET_CHANCE,
     RIDGES,
     TINY,
     TRIES,
     LAGS_s,
-    SPECTRUM_s,
+    SHORTEST_RECORD_s,
     WINDOW_s,
 )
 from coupled.record.channels import ControlName, channel, unit_of
 from coupled.record.record import Record
+from coupled.results import Plain
 from coupled.rig.rig import Rig
 
 Floats = NDArray[np.float64]
@@ -119,7 +118,7 @@ AIRFRAME = (
 
 
 @dataclass(frozen=True)
-class Follows:
+class Follows(Plain):
     """A signal correlated with a residual: its share of the power, 0 to 1, and the slope.
 
     `per_unit` is in the channel's unit over the signal's.
@@ -129,22 +128,14 @@ class Follows:
     share: float
     per_unit: float
 
-    def as_dict(self) -> dict[str, Any]:
-        """Return the JSON."""
-        return {"signal": self.signal, "share": self.share, "per_unit": self.per_unit}
-
 
 @dataclass(frozen=True)
-class PressureBand:
+class PressureBand(Plain):
     """The gap while q̄ is between two pressures, Pa."""
 
     from_Pa: float
     to_Pa: float
     gap: float
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the JSON."""
-        return {"from_Pa": self.from_Pa, "to_Pa": self.to_Pa, "gap": self.gap}
 
 
 @dataclass(frozen=True)
@@ -181,15 +172,11 @@ class Where:
 
 
 @dataclass(frozen=True)
-class Reversals:
+class Reversals(Plain):
     """A residual concentrated at reversals of motion: its share within a time of one, s."""
 
     within_s: float
     share: float
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the JSON."""
-        return {"within_s": self.within_s, "share": self.share}
 
 
 @dataclass(frozen=True)
@@ -272,7 +259,7 @@ def _reversals(left: Floats, known: dict[str, Floats], rate_Hz: float) -> Revers
     for within_s in LAGS_s[:3]:
         near = away_s <= within_s
         share = float(left[near] @ left[near]) / power
-        if share >= NEAR_SHARE and share >= MORE * float(np.mean(near)):
+        if share >= MOST and share >= MORE * float(np.mean(near)):
             return Reversals(within_s, share)
     return None
 
@@ -366,7 +353,7 @@ def _follows(
 
 def _peak(left: Floats, rate_Hz: float) -> float:
     """Return the frequency, Hz, of the largest power (Welch, segments with half overlap)."""
-    many = min(len(left), round(SPECTRUM_s * rate_Hz))
+    many = min(len(left), round(SHORTEST_RECORD_s * rate_Hz))
     pieces = np.lib.stride_tricks.sliding_window_view(left, many)[:: many - many // 2]
     level = pieces - np.mean(pieces, axis=1, keepdims=True)
     taper = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(many) / many)
@@ -415,7 +402,7 @@ def in_time(left: Floats, drives: Mapping[str, Floats], rate_Hz: float) -> InTim
     frames = max(1, round(WINDOW_s * rate_Hz))
     rms = _rms(left, frames)
     loud = rms > DOUBLED
-    excited = np.array([_rms(x - np.median(x), frames) for x in list(drives.values())[:DRIVES]])
+    excited = np.array([_rms(x - np.median(x), frames) for x in drives.values()])
     window_s, last = frames / rate_Hz, len(loud)
     share = float(np.mean(loud)) if last else 0.0
     if not last or not loud.any() or not len(excited):

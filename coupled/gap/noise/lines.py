@@ -19,11 +19,11 @@ from numpy.typing import NDArray
 
 from coupled.gap.thresholds import (
     LESSER,
-    LINE_BANDS,
     LINE_HEIGHT,
     MAINS_OFF,
     MINOR,
     NOISE_FROM,
+    PIECE,
     ROUNDS,
     TAPER_BINS,
     WHITE_FRAMES,
@@ -149,7 +149,7 @@ def _highest(signal: Floats) -> float | None:
     omega = np.linspace(0.0, math.pi, len(power))
     first = int(np.searchsorted(omega, NOISE_FROM * math.pi))
     power = power[first:] / (2.0 * np.sin(0.5 * omega[first:])) ** 8
-    parts = np.array_split(power, LINE_BANDS)
+    parts = np.array_split(power, PIECE // 4)
     level = np.concatenate([np.full(len(p), np.median(p) / math.log(2.0)) for p in parts])
     if not np.all(level > 0.0):
         return None

@@ -30,9 +30,10 @@ from scipy.interpolate import CubicSpline
 
 from coupled.gap.noise.lines import Line, lines_in
 from coupled.gap.noise.noise import Noise, noise_of
-from coupled.gap.thresholds import FEW_FRAMES, REST_FRAMES, REST_SPREAD, SIGMAS, SMALL
+from coupled.gap.thresholds import FEW_FRAMES, PIECE, SIGMAS, SMALL
 
 Floats = NDArray[np.float64]
+REST_FRAMES = PIECE // 2  # of a window at rest
 
 
 @dataclass(frozen=True)
@@ -89,7 +90,7 @@ def _quiet(signal: Floats, noise: Noise) -> NDArray[np.bool_]:
     window, half = REST_FRAMES, REST_FRAMES // 2
     windows = np.lib.stride_tricks.sliding_window_view(signal, window)
     first, second = windows[:, :half].mean(axis=1), windows[:, half:].mean(axis=1)
-    spread = REST_SPREAD * noise.rms
+    spread = noise.rms * (1.0 + SIGMAS / math.sqrt(2.0 * window))  # of an estimated rms
     apart = SIGMAS * noise.rms * math.sqrt(2.0 * _longer(noise) / half)
     still = (windows.std(axis=1) <= spread) & (np.abs(second - first) <= apart)
     begun = np.concatenate((still.astype(int), np.zeros(window, dtype=int)))

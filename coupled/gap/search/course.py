@@ -34,15 +34,15 @@ from coupled.gap.signals.output import Output, memory
 from coupled.gap.thresholds import (
     COURSE_GAIN,
     ENDS,
-    FEWEST_WINDOWS,
-    FINE,
     NEGLIGIBLE,
+    NORMAL_95,
     ONSET_CHANCE,
     ROUGH,
     ONSETS_s,
     WINDOW_s,
 )
 from coupled.record.channels import ControlName
+from coupled.results import Plain
 from coupled.rig.rig import Rig
 
 Floats = NDArray[np.float64]
@@ -50,7 +50,7 @@ Kind = Literal["constant", "changes", "from", "grows", "events"]
 
 
 @dataclass(frozen=True)
-class Bounds:
+class Bounds(Plain):
     """A number with its 95 % interval."""
 
     value: float
@@ -61,10 +61,6 @@ class Bounds:
         """Return the number and its interval times a factor."""
         ends = sorted((factor * self.low, factor * self.high))
         return Bounds(factor * self.value, *ends)
-
-    def as_dict(self) -> dict[str, float]:
-        """Return the JSON."""
-        return {"value": self.value, "low": self.low, "high": self.high}
 
 
 @dataclass(frozen=True)
@@ -121,7 +117,7 @@ def course_of(
     """
     sizes, weights, times_s = _sizes(parts, rate_Hz)
     plain = Course("grows" if gradual else "constant", rate_per_s=value if gradual else None)
-    if len(sizes) < FEWEST_WINDOWS:
+    if len(sizes) < 4 * ENDS:
         return plain
     if gradual:
         sizes, weights = sizes * times_s, weights / times_s**2
@@ -136,7 +132,7 @@ def course_of(
     if gain < COURSE_GAIN or changed < ROUGH:
         return plain
     near = [one for one in others if one.kind == best.kind and _near(one, best, count)]
-    sure = 1.96 * math.sqrt(best.cost / max(count - 2.0, 1.0))
+    sure = NORMAL_95 * math.sqrt(best.cost / max(count - 2.0, 1.0))
     low = min(one.factor - sure * one.error for one in near)
     factor = Bounds(best.factor, low, max(one.factor + sure * one.error for one in near))
     if best.kind == "changes":
@@ -217,14 +213,14 @@ def _onsets(times_s: Floats, sizes: Floats, weights: Floats) -> list[_Law]:
         found.append(_ramp(times_s, sizes, weights, onset_s))
     # The onset of a ramp is better known than to one window, and its slope depends on it.
     best = min((law for law in found if law.kind == "grows"), key=lambda law: law.cost)
-    near = best.onset_s + WINDOW_s * np.linspace(-1.5, 1.5, FINE)
+    near = best.onset_s + np.arange(-1.5 * WINDOW_s, 1.5 * WINDOW_s, 0.5 * ONSETS_s)
     found += [_ramp(times_s, sizes, weights, onset_s) for onset_s in near.tolist()]
     return found
 
 
 def _near(one: _Law, best: _Law, count: float) -> bool:
     """Tell whether a time history is within the 95 % likelihood region of the best (χ²₁)."""
-    return count * math.log(max(one.cost, 1e-300) / max(best.cost, 1e-300)) <= 3.84
+    return count * math.log(max(one.cost, 1e-300) / max(best.cost, 1e-300)) <= NORMAL_95**2
 
 
 @dataclass(frozen=True)

@@ -26,11 +26,11 @@ from coupled.gap.noise.smooth import Smoother, rate_of, smoothed
 from coupled.gap.signals.output import estimate_noise, white
 from coupled.gap.thresholds import STIFFEST_AIR
 from coupled.record.record import Record
+from coupled.units import GRAVITY_m_per_s2
 
 Floats = NDArray[np.float64]
 NEEDS = ("alpha_rad", "pitch_rad", "true_airspeed_m_per_s", "altitude_m")
 LOAD = "load_factor"
-GRAVITY_m_per_s2 = 9.80665
 
 
 @dataclass(frozen=True)

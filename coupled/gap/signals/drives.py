@@ -19,17 +19,14 @@ import math
 from collections.abc import Collection
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 
 from coupled.gap.signals.output import Floats, estimate_noise, rounding
 from coupled.gap.thresholds import (
     FEW,
-    FEW_FRAMES,
-    HELD_AT_MOST,
-    HELD_JUMPS,
-    HELD_STEPS,
     MOST,
     NEGLIGIBLE,
+    SHORT_FRAMES,
+    SIGMAS,
     SHORTEST_RECORD_s,
 )
 from coupled.record.channels import ControlName, channel, unit_of
@@ -84,39 +81,22 @@ def _made(record: Record, control: ControlName) -> bool:
     given, grip = channel(control, "computed"), channel(control, "deflection")
     if any(name in record for name in others) or not (given in record and grip in record):
         return False
-    return _finest(record[given]) < NEGLIGIBLE * estimate_noise(record[grip]).rms
-
-
-def _finest(signal: Floats) -> float:
-    """Return the noise of the quietest stretches in which a signal moves; infinite if none.
-
-    By fourth differences, over stretches short enough that the motion does not contribute in the
-    quietest. A motion of less than two converter steps a frame is left out, since its values
-    repeat by rounding.
-    """
-    steps = np.abs(np.diff(signal))
-    if not np.any(steps) or len(steps) < FEW_FRAMES + 4:
-        return np.inf
-    least = float(np.diff(np.unique(signal)).min())
-    slowest = sliding_window_view(steps, FEW_FRAMES + 3).min(axis=1)
-    rough = sliding_window_view(np.diff(signal, 4), FEW_FRAMES)
-    moving = slowest > 1.5 * least
-    noise = np.sqrt(np.mean(rough[moving] ** 2, axis=1) / 70.0)
-    return float(np.quantile(noise, 0.1)) if noise.size else np.inf
+    noise, own = (estimate_noise(record[name]).rms for name in (grip, given))
+    return own < NEGLIGIBLE * noise
 
 
 def in_set_points(signal: Floats) -> bool:
     """Tell whether a signal comes in set points, each held over two frames or more.
 
-    Changes in consecutive frames show a motion; pauses longer than `HELD_AT_MOST` are ignored.
+    Changes in consecutive frames show a motion; pauses longer than `SHORT_FRAMES` are ignored.
     """
     changes = np.flatnonzero(np.diff(signal))
-    if len(changes) < HELD_JUMPS:
+    if len(changes) < SHORT_FRAMES:
         return False
     apart = np.diff(changes)
-    moving = apart[apart <= HELD_AT_MOST]
+    moving = apart[apart <= SHORT_FRAMES]
     sizes = np.abs(np.diff(signal)[changes])
-    uneven = float(np.median(sizes)) > HELD_STEPS * float(sizes.min())
+    uneven = float(np.median(sizes)) > SIGMAS * float(sizes.min())
     return uneven and len(moving) > 0 and float(np.mean(moving >= 2)) >= (1.0 - FEW)
 
 

@@ -98,15 +98,8 @@ def share_from_source(signal: Floats, made: Floats) -> tuple[float, float]:
     The share is of the noise's power, 0 to 1, the rest an rms. `made` is the signal computed with
     the noise of its source; delays and filters of the source over some frames are allowed for.
     """
-    noise, source = np.diff(signal, 4)[SHORT_FRAMES:], np.diff(made, 4)
-    delayed = np.column_stack(
-        [source[SHORT_FRAMES - k : len(source) - k] for k in range(SHORT_FRAMES)]
-    )
-    left = noise - delayed @ np.linalg.lstsq(delayed, noise, rcond=None)[0]
-    power = float(noise @ noise)
-    share = 1.0 - float(left @ left) / power if power > 0.0 else 0.0
-    rest = float(np.sqrt(np.mean(left**2) / 70.0))
-    return share, max(rest, rounding(signal, float(np.sqrt(power / len(noise) / 70.0))))
+    noise, rest = _regressed(signal, made, range(SHORT_FRAMES))
+    return 1.0 - rest**2 / noise**2 if noise else 0.0, max(rest, rounding(signal, noise))
 
 
 def share_in_response(force: Floats, answer: Floats) -> float:
@@ -115,12 +108,22 @@ def share_in_response(force: Floats, answer: Floats) -> float:
     A response shows what is signal in the force, not noise. Fourth differences of the force are
     regressed on those of the response about the same frame, without a model between them.
     """
-    rough, shown = np.diff(force, 4)[(FEW_FRAMES // 2) : -(FEW_FRAMES // 2)], np.diff(answer, 4)
-    last = len(shown) - 2 * (FEW_FRAMES // 2)
-    near = np.column_stack([shown[k : k + last] for k in range(2 * (FEW_FRAMES // 2) + 1)])
-    left = rough - near @ np.linalg.lstsq(near, rough, rcond=None)[0]
-    power = float(rough @ rough)
-    return 1.0 - float(left @ left) / power if power > 0.0 else 0.0
+    half = FEW_FRAMES // 2
+    noise, rest = _regressed(force, answer, range(-half, half + 1))
+    return 1.0 - rest**2 / noise**2 if noise else 0.0
+
+
+def _regressed(signal: Floats, onto: Floats, delays: range) -> tuple[float, float]:
+    """Return the rms of a signal's white noise, and that without what another signal repeats.
+
+    Fourth differences are regressed on those of the other signal, delayed by so many frames.
+    """
+    rough, other = np.diff(signal, 4), np.diff(onto, 4)
+    inner = slice(max(delays.stop, 0), len(rough) + min(delays.start, 0))
+    moved = np.column_stack([np.roll(other, k)[inner] for k in delays])
+    left = rough[inner] - moved @ np.linalg.lstsq(moved, rough[inner], rcond=None)[0]
+    before, after = (float(np.sqrt(np.mean(x**2) / 70.0)) for x in (rough[inner], left))
+    return before, after
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,6 @@ from coupled.gap.thresholds import (
     SIGMAS,
     SMALL,
     SMOOTHING_LOST,
-    STRETCH_POWER,
     COARSE_STEPS_Hz,
     PIECE_s,
     STRETCH_s,
@@ -208,7 +207,7 @@ class Output:
         frames = stretch_of(len(self.measured), self.frame_rate_Hz)
         least = max(1, round(PIECE_s * self.frame_rate_Hz))
         power = np.concatenate(([0.0], np.cumsum(self.residual(rig) ** 2)))
-        most = max(STRETCH_POWER, 2.0 * frames / len(self.measured)) * float(power[-1])
+        most = max(1.0 / FEW_STRETCHES, 2.0 * frames / len(self.measured)) * float(power[-1])
         held = np.zeros(len(self.measured), dtype=bool)
         start, odd = 0, False
         while start < len(held):

@@ -23,6 +23,7 @@ from coupled.gap.signals.floors import Drive, floor_from, noise_in
 from coupled.gap.signals.live import Assumed, Live, Mask, live_of
 from coupled.gap.signals.missed import Missed, missed_in
 from coupled.gap.signals.output import Floats
+from coupled.gap.thresholds import FAR, ROUNDING_SPAN
 from coupled.record.channels import SURFACES, ControlName, channel
 from coupled.record.record import Record
 from coupled.rig.crossing import leaking
@@ -32,9 +33,6 @@ from coupled.rig.parameters import Sensing
 from coupled.rig.recorder import stamped
 from coupled.rig.replay import replay_schedule
 from coupled.rig.rig import Rig
-
-FAR = 10.0  # of a curve's length, up to which it is inverted beyond its ends
-FLAT_SLOPE = 1e-6  # of a map where it is flat, to be inverted
 
 
 @dataclass(frozen=True)
@@ -134,7 +132,7 @@ def _inverse(curve: Curve, values: Floats) -> Floats:
     at = np.concatenate(([least], -nodes[::-1] if curve.odd else [], nodes, [far]))
     at = np.unique(at)
     found = curve.at(at)
-    return np.asarray(np.interp(values, found + FLAT_SLOPE * at, at))
+    return np.asarray(np.interp(values, found + ROUNDING_SPAN * at, at))
 
 
 PRESSURE, LOAD = "dynamic_pressure_Pa", "load_factor"
@@ -237,19 +235,16 @@ class Reading:
             "compensation": [self.name_of(q) for q in ("computed", "force", "estimate")],
             "surface": [self.name_of("estimate"), PRESSURE, self.surface],
         }
-        lacking = {s: [n for n in names if n not in self.record] for s, names in needs.items()}
         if self.moved:
             loader = [self.name_of("force"), self.name_of(self.imposed), *self._gradient_from()]
             needs = {"schedule": needs["schedule"], "loader": loader}
-            lacking = {s: [n for n in names if n not in self.record] for s, names in needs.items()}
-        if self.in_series:
+        elif self.in_series:
             del needs["linkage"]
             needs["loader"] = [self.name_of(q) for q in ("force", "deflection")]
             needs["loader"] += self._gradient_from()
-            lacking = {s: [n for n in names if n not in self.record] for s, names in needs.items()}
-        if self.set_points:  # without the force only a bend cannot be identified
-            needless = self.name_of("force")
-            lacking["linkage"] = [name for name in lacking["linkage"] if name != needless]
+        elif self.set_points:  # without the force only a bend cannot be identified
+            needs["linkage"] = [self.name_of(q) for q in ("computed", "deflection")]
+        lacking = {s: [n for n in names if n not in self.record] for s, names in needs.items()}
         return {stage: names for stage, names in lacking.items() if names}
 
     @property
