@@ -24,8 +24,7 @@ from coupled.campaign.sweep import SweepResult
 from coupled.errors import InputError
 from coupled.exporting.write import Export
 from coupled.files import check_target, write_text
-from coupled.gap.findings.diagnosis import Diagnosis, PartDiagnosis
-from coupled.gap.findings.whole import WholeDiagnosis
+from coupled.gap.findings.diagnosis import Diagnosis, PartDiagnosis, WholeDiagnosis
 from coupled.gap.nominal import NominalFit
 from coupled.plots.checks import draw_static_checks
 from coupled.plots.fits import draw_fit

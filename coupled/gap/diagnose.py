@@ -21,11 +21,10 @@ from coupled.gap.chain import Part
 from coupled.gap.findings.answer import effects_of, incredible, settings_of, verdict_of
 from coupled.gap.findings.budget import floors_of, shrink, stage_budget
 from coupled.gap.findings.curves import find_curves
-from coupled.gap.findings.diagnosis import Diagnosis, PartDiagnosis
+from coupled.gap.findings.diagnosis import Diagnosis, PartDiagnosis, WholeDiagnosis
 from coupled.gap.findings.healthy import Baseline, beside_healthy
 from coupled.gap.findings.judge import Judge
 from coupled.gap.findings.result import StageResult
-from coupled.gap.findings.whole import WholeDiagnosis
 from coupled.gap.parts import moves, parts_of
 from coupled.gap.prepare import Prepared, prepare
 from coupled.gap.search.case import Case, Tell

@@ -17,9 +17,8 @@ from coupled.gap.batch import Job, Row
 from coupled.gap.chain import Part
 from coupled.gap.diagnose import _airframe_first, diagnose
 from coupled.gap.findings.budget import shapley_subsets
-from coupled.gap.findings.diagnosis import Diagnosis
+from coupled.gap.findings.diagnosis import Diagnosis, verdict_of_all
 from coupled.gap.findings.result import Findings, Verdict
-from coupled.gap.findings.whole import verdict_of_all
 from coupled.gap.parts import parts_of
 from coupled.gap.thresholds import MOST_PLAYERS
 from coupled.record.channels import CONTROL_NAMES, ControlName

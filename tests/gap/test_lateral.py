@@ -7,7 +7,7 @@ import pytest
 from coupled.gap.diagnose import diagnose
 from coupled.gap.effects.effect import apply
 from coupled.gap.effects.library import BY_NAME
-from coupled.gap.findings.flown import closed_loop, fly_force
+from coupled.gap.findings.flown import Again, closed_loop, fly_force
 from coupled.gap.stages.surfaces import surface_points
 from coupled.record.channels import ControlName
 from coupled.record.record import Record
@@ -56,7 +56,7 @@ def test_a_surface_of_wheel_and_pedals_is_judged(
     assert number.low is not None and number.high is not None
     assert number.low < value < number.high
     assert whole.guilty == ("surface",)
-    again = closed_loop(cessna, whole.improved, [control], record)
+    again = closed_loop(cessna, whole.improved, [control], Again.of(cessna, [control], record))
     assert again is not None
     rate = "roll_rate_rad_per_s" if control == "wheel" else "yaw_rate_rad_per_s"
     [turned] = [one for one in again if one.channel == rate]

@@ -153,23 +153,19 @@ def closed_loop(
     nominal: Rig,
     improved: Rig,
     controls: Sequence[ControlName],
-    record: Record,
-    again: Again | None = None,
+    again: Again | None,
 ) -> tuple[ChannelAgain, ...] | None:
     """Return the RMS differences from the record of both rigs, flown with the controls' forces.
 
-    `again` is the simulation, if it exists already. None if the record lacks a force or a
-    bench's q̄, or if a rig cannot be flown.
+    None without a simulation, if a control is not moved by force, or if a rig cannot be flown.
     """
-    if not nominal.controls or any(nominal.controls[c].drive != "force" for c in controls):
-        return None
-    again = Again.of(nominal, controls, record) if again is None else again
-    if again is None:
+    by_force = nominal.controls and all(nominal.controls[c].drive == "force" for c in controls)
+    if again is None or not by_force:
         return None
     names = [channel(control, quantity) for control in controls for quantity in COMPARED]
     motion = [*map(surface_channel, controls), *MOTION, *LATERAL]
     motion = motion if nominal.flight is not None else []
-    names = [name for name in (*names, *motion) if name in record]
+    names = [name for name in (*names, *motion) if name in again.record]
     before, after = (_differences(again, rig, names) for rig in (nominal, improved))
     if before is None or after is None:
         return None
