@@ -6,14 +6,15 @@
     error rate    of a test, as a probability or in standard deviations
 
 "Blind trials" are records of `coupled blind make`; no constant was set on a published score.
-"Chosen" marks a value set by judgement, without a count that supports it.
+"Chosen" marks a value set by judgement, without a count that supports it. "Ablated" marks one of
+which half and twice, in groups, change no right answer of 29 records of seed 2044.
 """
 
 from __future__ import annotations
 
 # Levels that many tests share, as shares of a whole if nothing else is given.
 SIGMAS = 3.0  # error rate: control limits (Shewhart 1931); a false alarm in some 370 values
-FAR_SIGMAS = 8.0  # error rate, of an error whose distribution is not known; chosen
+FAR_SIGMAS = 8.0  # error rate, of an error whose distribution is not known; ablated
 TINY = 1e-3  # step: a change that no result depends on; chosen
 NEGLIGIBLE = 0.01  # tolerance: a share, an angle in rad or a gain that does not count; chosen
 FEW = 0.02  # tolerance: part of a signal's values or of a residual that is noise's; chosen
@@ -28,9 +29,9 @@ MORE, DOUBLED = 1.5, 2.0  # step: ratios of two levels that differ, and differ c
 ROUNDS, TRIES = 3, 4  # step: repeats that may improve a result; samples, or alternatives; chosen
 
 # Records that are refused (`checks`).
-OTHER_SPEED = 0.03  # tolerance of the trimmed airspeed; chosen
+OTHER_SPEED = 0.03  # tolerance of the trimmed airspeed; ablated
 SHORT_FRAMES = 12  # step: a tenth of a second at 120 Hz, before a motion changes; and of set
-# points, the most frames between two and the least number; chosen
+# points, the most frames between two and the least number; ablated
 FEW_FRAMES = 8  # step: in which a motion may be straight, or a rest begins; chosen
 BRIEF_s, FLIGHT_s = 1.0, 15.0  # step: of a trim at a record's start; of a test flight. With 15 s
 # the offset of 26 records of a T-37 was decided right; longer, the phugoid's own error decided
@@ -41,10 +42,10 @@ BRIDGED_s = 0.025  # step: three frames at 120 Hz represent 15 Hz; a hand moves 
 SETTLE_s, LEAD_s = 0.2, 0.05
 
 # Noise and rounding of a channel (`noise`).
-ROUNDING_SPAN = 1e-6  # tolerance: of a channel's span, the least resolution of a file; chosen
+ROUNDING_SPAN = 1e-6  # tolerance: of a channel's span, the least resolution of a file; ablated
 NOISE_FROM = 0.4  # prior: of the Nyquist frequency, above which is noise alone; with 0.2 and 0.7
 # the noise of 681 channels with known noise is within 2 % of the same
-WHITE_FRAMES = 400  # step: frames; with fewer the colour is not estimated; chosen
+WHITE_FRAMES = 400  # step: frames; with fewer the colour is not estimated; ablated
 COLOURS = tuple(0.02 * k for k in range(43))  # step: lag-one correlations, to 0.84
 PIECE = 64  # step: frames of a spectrum; chosen
 QUIET_SHARE = 0.3  # step: of the quieter pieces; 0.5 includes pieces in which a loader sticks
@@ -65,8 +66,8 @@ MAINS_OFF = 0.01  # tolerance: a public grid stays within 1 % for 99.5 % of a ye
 STRETCH_s = 2.5  # step: longer than a residual's memory, with enough stretches in 20 s; chosen
 PIECE_s = 0.25  # step: the shortest part of it; of replays between restarts; chosen
 SHORTEST_RECORD_s = 2.0 * STRETCH_s  # step: one stretch to fit and one to hold out
-LEAST_STRETCHES = 2.0  # step: for a scatter between them, and for each parameter; chosen
-LEAST_MEMORIES = 20.0  # step: correlation times of the residual in a stretch; chosen
+LEAST_STRETCHES = 2.0  # step: fewest that have a scatter, and for each parameter
+LEAST_MEMORIES = 20.0  # step: correlation times of the residual in a stretch; ablated
 
 # Limits of the residual by noise alone (`output`).
 FAULTY_FROM = 1.2  # tolerance: records of the independent twin without an effect reach a gap of 1.1
@@ -79,19 +80,19 @@ REACHED_OVER = (2, 3, 4, 6, 8, 12)  # step: frames over which a speed is compute
 
 # Inputs of the stages (`stages`, `airframe`, `surfaces`, `trim`).
 REPLAY_KNOWN = 1e-5  # tolerance: error of a replay, of a span; no transducer is better
-KNOWN = 1e-4  # tolerance: the same of a flight by measured commands, and in rad; chosen
+KNOWN = 1e-4  # tolerance: the same of a flight by measured commands, and in rad; ablated
 SAMPLED = 47  # step: seed of the noise with which creep is tested
 # Error rate: relative increase of the mean square residual by the predicted creep, up to which it
 # is removed, and above which it is kept: 0.01 in 11 blind records with creep, 0.35 in 3 without.
 CREEP_WORSE = (0.1, 0.3)
-CREEP_FRICTION_N = 2.0  # prior: of a friction that the rig file lacks; chosen
-SURFACE_GUST_m_per_s = 3.0  # step: to see whether an aircraft moves its own surfaces; chosen
-SAME_TRIM_rad = 1e-9  # step: largest difference of two trims of one model; chosen
-TRIM_SIGMAS = 4.0  # error rate: standard deviations of a trim's difference; chosen
+CREEP_FRICTION_N = 2.0  # prior: of a friction that the rig file lacks; ablated
+SURFACE_GUST_m_per_s = 3.0  # step: to see whether an aircraft moves its own surfaces; ablated
+SAME_TRIM_rad = 1e-9  # step: largest difference of two trims of one model; ablated
+TRIM_SIGMAS = 4.0  # error rate: standard deviations of a trim's difference; ablated
 TRIM_ANSWERED = 13.8  # error rate: χ² of two parameters, exceeded by chance in 1 of 1000
 TRIM_LAGS_s = (0.0, 0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 1.0, 1.3, 1.7, 2.2, 3.0, 4.0)  # step; chosen
 FAR = 1e3  # step: noise floors of a residual without a trim; of a bound, over its start
-LOST_MOTION = 20.0  # step: rad/s of pitch rate, above which an open-loop flight is lost; chosen
+LOST_MOTION = 20.0  # step: rad/s of pitch rate, above which an open-loop flight is lost; ablated
 STIFFEST_AIR = 1e12  # step: frames⁴: largest weight that keeps banded equations well conditioned
 PLAYS = 40  # step: plays of a scan before an imposed motion's are fitted; chosen
 
@@ -100,13 +101,13 @@ SETTING = 0.02  # tolerance: a potentiometer is set, and a servo tuned, to 1 or 
 YIELDS_m = 5e-4  # prior: largest presliding length of friction; the contract's
 LENGTHS = (0.03, 0.1, 0.3, 0.8)  # step: presliding lengths, of the largest one; and elastic
 ELASTIC_SHARES = (0.0, 0.3, 0.6, 0.9)  # shares, where the search starts; chosen
-SEARCHED_TO = 0.03  # step: its last one, relative; chosen
-CLOCK_s = 5e-4  # tolerance of a recorder's time stamps; chosen
+SEARCHED_TO = 0.03  # step: its last one, relative; ablated
+CLOCK_s = 5e-4  # tolerance of a recorder's time stamps; ablated
 
 # The scale of a machine (`scales`).
-COLUMN_FORCE_N = 20.0  # prior: RMS force; chosen
+COLUMN_FORCE_N = 20.0  # prior: RMS force; ablated
 COLUMN_WAY = {"m": 0.03, "rad": 0.3}  # prior: RMS motion of a column, a wheel; chosen
-OTHER_SCALE = 5.0  # prior: from which bounds are rescaled, and reach; chosen
+OTHER_SCALE = 5.0  # prior: from which bounds are rescaled, and reach; ablated
 LIGHT_LOAD_N = 10.0  # prior: load at which friction by load sets a contact's stiffness; chosen
 SERVO_START_Hz = 20.0  # prior: amid the 8 to 30 Hz of control loaders; chosen
 
@@ -115,15 +116,16 @@ MODEL_ERROR = 0.015  # prior: of an effect's size; LuGre against Coulomb frictio
 YIELDING_ERROR = 0.12  # prior: of presliding parameters; 0.15 N of force noise changes them by 12 %
 UNDERSTATED = 1.15  # error rate: factor on intervals; coverage of 1363 intervals 93 to 95 %
 NORMAL_95 = 1.96  # error rate: standard deviations to the end of a 95 % interval
-FIT_ITERATIONS, EDGE_BISECTIONS = 40, 30  # step; chosen
+FIT_ITERATIONS = 40  # step; ablated
+EDGE_BISECTIONS = 30  # step: to 10⁻⁹ of the range
 COARSE_STEPS_Hz = 960.0  # step of the coarse phase; at 480 Hz 2 of 17 blind records were wrong
-SHOOTINGS = 10  # step: evaluations of a fit by multiple shooting; chosen
-RACE_BEHIND = 4.0  # step: times the best sum of squares, above which a start is dropped; chosen
+SHOOTINGS = 10  # step: evaluations of a fit by multiple shooting; ablated
+RACE_BEHIND = 4.0  # step: times the best sum of squares, above which a start is dropped; ablated
 DIFFERENCE = 0.3  # step: noise floors by which a difference changes the residual, above its jumps
-DIFFERENCE_STEPS = (1e-4, 0.1)  # step: bounds of a difference's step, of its scale; chosen
+DIFFERENCE_STEPS = (1e-4, 0.1)  # step: bounds of a difference's step, of its scale; ablated
 MOVED_LITTLE = 0.02  # step: noise floors, below which a Jacobian is kept; 0.1 is wrong in 1 of 24
 DAMPING_FIRST, DAMPING_FACTOR = 0.01, 10.0  # step: Marquardt 1963
-FEWER = 5.0  # step: most correlation times by which samples of dry friction are fewer; chosen
+FEWER = 5.0  # step: most correlation times by which samples of dry friction are fewer; ablated
 SLOPES_KEPT = 250_000  # step: elements of a Jacobian, 2 MB, that is kept for another fit
 
 # A servo as fitted (`nominal`). Its phase margin in degrees is about 100 times its damping ratio
@@ -132,13 +134,13 @@ SLOPES_KEPT = 250_000  # step: elements of a Jacobian, 2 MB, that is kept for an
 LEAST_SERVO_RATIO = 0.1  # prior
 
 # Screening (`screen`), and starts from residuals (`effects/seen`).
-SCREEN_NEAR = 0.15  # step: of the best projection, above which other effects are fitted; chosen
-SCREEN_SHOWN = 1e-4  # step: floors²: least mean square of a significant signature; chosen
+SCREEN_NEAR = 0.15  # step: of the best projection, above which other effects are fitted; ablated
+SCREEN_SHOWN = 1e-4  # step: floors²: least mean square of a significant signature; ablated
 SCREEN_LESS = (0.2, 0.6, 0.99)  # step: shares of the filed value that are removed; chosen
 LIMIT_BISECTIONS = 10  # step: of the logarithm between its bounds; five decades to 1 %
 LIMIT_SHARES = (0.98, 0.95, 0.9, 0.84, 0.76, 0.65, 0.5, 0.35, 0.2, 0.1, 0.04)  # step; chosen
 SERVO_SHARES = tuple(0.98**k for k in range(1, 161))  # step: the same of a servo; chosen
-RIPPLE_PERIODS = 60.0  # prior: most periods within the deflections; chosen
+RIPPLE_PERIODS = 60.0  # prior: most periods within the deflections; ablated
 
 # Probabilities and verdicts (`answer`).
 RIVAL_GAIN = 4.0  # error rate: log evidence over what is no alternative; odds of 55
@@ -153,19 +155,20 @@ CERTAIN = 0.6  # error rate: of 6 effects of 0.6 to 0.7 in three seeds 5 were ri
 # When and where a gap lies (`where`, `course`).
 WINDOW_s = 0.5  # step: windows in which a residual, or a size, is estimated; chosen
 ONSET_CHANCE = 1e-3  # error rate: of excitation alone leaving all quiet before
-COURSE_GAIN = 8.0  # error rate: log-likelihood gain that discriminates two models; chosen
+COURSE_GAIN = 8.0  # error rate: log-likelihood gain that discriminates two models; ablated
 ONSETS_s = 0.1  # step: between onsets that are tried, and half of it about the best
-ENDS, BEGUN = 3, 4  # step: windows at the ends of a history, without onset; chosen
+ENDS, BEGUN = 3, 4  # step: windows at the ends of a history, without onset; ablated
 MOST_CHANGE = 100.0  # prior: % a minute, beyond which a rate is no drift of a machine; chosen
 
 # What a model free in form takes (`flexible`).
 BENDS = (0.02, 0.1, 0.3, 0.5, 0.7, 0.9, 0.98)  # step: quantiles where it may bend; chosen
-LAGS_s = (0.03, 0.1, 0.3, 1.0)  # step: of the copies of a signal; from reversals of motion; chosen
+LAGS_s = (0.03, 0.1, 0.3, 1.0)  # step: of the copies of a signal; from reversals of motion; ablated
 RIDGES = tuple(10.0**k for k in range(-7, 3))  # step; held-out stretches decide among them
 
 # How far a gap shrinks, what would have shown, and the next test (`budget`, `power`, `proposal`).
 MOST_PLAYERS = 5  # step: of Shapley, 32 subsets; more effects are averaged over first and last
-BOOTSTRAPS, FEW_STRETCHES = 400, 8  # step: draws of an interval; too few stretches for it; chosen
+BOOTSTRAPS = 400  # step: draws of an interval; ablated
+FEW_STRETCHES = 8  # step: too few stretches for an interval; chosen
 POWER_DECADES, POWER_HALVINGS = 3, 5  # step: beside a start; of the decade that shows, to 7 %
 
 # Whether an effect is the cause (`credibility`). Set on 68 effects found in blind records of seeds
@@ -179,12 +182,12 @@ DRIFT_CHANCE = 0.01  # error rate of all halves: of 744 right effects of three s
 
 # The search over sets of effects (`beam`, `evidence`).
 BEAM_WIDTH, BEAM_DEPTH = 6, 4  # step: sets that are extended, and largest depth
-BEAM_CANDIDATES = 8  # step: effects fitted beside the best set; chosen
+BEAM_CANDIDATES = 8  # step: effects fitted beside the best set; ablated
 GIVEN_UP = 30.0  # step: log evidence behind the best, at which a start or a set is dropped
-BEAM_SIZES = (0.03, 0.3, 1.0, 5.0)  # step: times the start of a parameter, for signatures; chosen
+BEAM_SIZES = (0.03, 0.3, 1.0, 5.0)  # step: times the start of a parameter, for signatures; ablated
 BEAM_FACTORS = (-2.0, 0.5, 1.0, 5.0)  # step: the same for the difference of a factor from 1; chosen
 PRIOR_EFFECT = 4.0  # −ln of an effect's prior probability: one of some 71, about equally likely
-PRIOR_NUMBER = 1.0  # −ln of the prior of a law by each parameter beyond the first; chosen
+PRIOR_NUMBER = 1.0  # −ln of the prior of a law by each parameter beyond the first; ablated
 PRIOR_SPAN = 9.2  # prior: ln 10⁴; over four decades a size is equally likely in each
 VERY_STRONG = 5.0  # error rate: log evidence, 2 ln B > 10 (Kass and Raftery 1995)
 
@@ -199,10 +202,10 @@ TERM_LEAST = 0.01  # tolerance: of the contract: share of its axis from which a 
 
 # Curves of one signal (`curves`, `curvefit`).
 CURVE_NODES = 18  # step: most nodes; a rig file takes 24, and differences add up to three
-CURVE_PLACES = 24  # step: even places of a node, and as many quantiles; chosen
+CURVE_PLACES = 24  # step: even places of a node, and as many quantiles; ablated
 CURVE_KINKS = (0.1, 0.5, 2.0, 10.0, 50.0)  # prior: kinks, of the values' size; evidence decides
-CURVE_STEP = 0.01  # step: of a difference, of the size of the stage's signals; chosen
-CURVE_ROUNDS = 4  # step: most fits about the last curve; chosen
-CURVE_NEAR = 0.3  # step: of the best gain, from which a law is fitted further; chosen
+CURVE_STEP = 0.01  # step: of a difference, of the size of the stage's signals; ablated
+CURVE_ROUNDS = 4  # step: most fits about the last curve; ablated
+CURVE_NEAR = 0.3  # step: of the best gain, from which a law is fitted further; ablated
 CURVE_CLOSES = 0.5  # error rate: least share of the gap, surely closed on held-out data; chosen
-CURVE_DRIFT = 0.2  # error rate: of a curve's size, from half to half of the records; chosen
+CURVE_DRIFT = 0.2  # error rate: of a curve's size, from half to half of the records; ablated
