@@ -15,9 +15,9 @@ from __future__ import annotations
 # Levels that many tests share, as shares of a whole if nothing else is given.
 SIGMAS = 3.0  # error rate: control limits (Shewhart 1931); a false alarm in some 370 values
 FAR_SIGMAS = 8.0  # error rate, of an error whose distribution is not known; ablated
-TINY = 1e-3  # step: a change that no result depends on; chosen
-NEGLIGIBLE = 0.01  # tolerance: a share, an angle in rad or a gain that does not count; chosen
-FEW = 0.02  # tolerance: part of a signal's values or of a residual that is noise's; chosen
+TINY = 1e-3  # step: a change that no result depends on; ablated
+NEGLIGIBLE = 0.01  # tolerance: a share, an angle in rad or a gain that does not count; ablated
+FEW = 0.02  # tolerance: part of a signal's values or of a residual that is noise's; ablated
 MINOR = 0.05  # error rate: a part, a correlation or 1 − cosine that is not distinct; chosen
 SMALL = 0.1  # tolerance: of a signal's rms, up to which an error hides nothing; chosen
 LESSER = 0.2  # step: of what a correct explanation, or a further step, may leave; chosen
