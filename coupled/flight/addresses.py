@@ -5,7 +5,7 @@ them; from compiled code the same function takes some 5 ns. JSBSim's module expo
 functions by the names of the Itanium ABI (Linux, macOS). A word of a node's Python object is its
 address; it is accepted only if it refers to an object with the table of virtual functions of
 JSBSim's nodes. Where anything differs, frames are flown through Python, with the same record to the
-byte.
+byte. The step itself, `run()`, may raise an error, and is called from Python.
 """
 
 from __future__ import annotations
