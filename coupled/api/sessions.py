@@ -26,7 +26,7 @@ from coupled.rig.serving import check_service, set_service
 from coupled.rig.switches import Switches
 
 _LONGEST_s = 7200.0  # of a flight, as of a run
-_FIRST_s = 16.0  # length of the arrays at first; they double
+_FIRST_s = 60.0  # length of the arrays at first; to double them takes some 200 steps
 _NAME = "coupled.Session"
 _CLOSED = "the session is closed; make a new one"
 
@@ -267,7 +267,7 @@ class Session:
         `seed` is that of the next flight's noise, turbulence and gusts; without it, the session's.
         The aircraft of a 737, B747, T-37 or F-16 is reset, if nothing but its commands acts on it.
         Others are loaded anew, without a leak: JSBSim's reset does not restore the hysteresis of a
-        stall, as of a c172p, or the position of an actuator, as of an awjsra.
+        stall, as of a c172p, or the position of a kinematic component, as of an awjsra's nozzles.
         """
         self._check_open("reset")
         self._start(self._begun if seed is None else replace(self._begun, seed=seed))

@@ -25,15 +25,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.errors import LISTED, InputError, listed, nearest
+from coupled.flight.addresses import addresses, node_of
 from coupled.flight.everyframe import (
     LATERAL_PROPERTIES,
     LONGITUDINAL_PROPERTIES,
     PROPERTIES,
+    TO_SI,
     Lever,
     PlainAircraft,
     PlainFrames,
     PlainSteps,
     Read,
+    Write,
     command_writes,
     mean_reader,
     motion_reader,
@@ -51,7 +54,7 @@ from coupled.flight.surfacemap import flown_through, stops_found
 from coupled.flight.wrapper import Step, Wrapper, led_by
 from coupled.record.channels import ALTITUDE, LONGITUDINAL, SURFACES, motion_channels
 from coupled.rig.parameters import Flight
-from coupled.rig.placed import HalfFrames, Placed
+from coupled.rig.placed import Connection, HalfFrames, Placed
 from coupled.units import DEGREE_rad, FOOT_m, KNOT_m_per_s
 
 _COMMANDS = {name: f"fcs/{name}-cmd-norm" for name in SURFACES.values()}
@@ -184,9 +187,8 @@ class JSBSimAirframe:
         # Above this altitude no wheel is near the ground, and the height need not be checked.
         ground_m = self.motion()[ALTITUDE] - self._height() * FOOT_m
         self.safe_altitude_m = ground_m + 100.0
-        calls = (self._fdm.run, self.safe_altitude_m, self.trouble)
         alone = not hooks and flight.steps_per_frame == 1
-        self._plain = PlainAircraft(along, beside, writes, *calls) if alone else None
+        self._plain = self._connected([*along, *beside], writes) if alone else None
         if trouble := self.trouble():
             raise self.fault("altitude_m", f"{trouble} at the start; choose a higher one")
 
@@ -353,6 +355,22 @@ class JSBSimAirframe:
             raise self.fault(UNTRIMMED, f"{where}: {problem}; choose others")
         if not started or not math.isfinite(fdm["aero/alpha-rad"]):
             raise self.fault("model", f"{flight.model} does not start: {_log.text.strip()[-200:]}")
+
+    def _connected(self, reads: Sequence[Read], writes: Sequence[Write]) -> PlainAircraft | None:
+        """Return the aircraft by its nodes' addresses; None if they are not known."""
+        calls: list[Callable[..., object]] = [*reads, *(write for write, _ in writes)]
+        nodes = [node_of(call) for call in calls]
+        if (found := addresses(nodes)) is None:
+            return None
+        functions, at = found
+        connection = Connection(
+            functions.read,
+            functions.write,
+            list(zip(at[: len(reads)], TO_SI, strict=False)),
+            [(node, trim) for node, (_, trim) in zip(at[len(reads) :], writes, strict=True)],
+            self.safe_altitude_m,
+        )
+        return PlainAircraft(connection, nodes, self._fdm.run, self.trouble)
 
     def _start_engines(self) -> None:
         self._fdm["propulsion/set-running"] = -1

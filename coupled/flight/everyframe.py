@@ -6,8 +6,15 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
-from coupled.record.channels import LATERAL, LONGITUDINAL, ControlName
-from coupled.rig.placed import Commands, HalfFrames, Placed
+from coupled.record.channels import (
+    ALTITUDE,
+    LATERAL,
+    LONGITUDINAL,
+    PRESSURE,
+    SPEED,
+    ControlName,
+)
+from coupled.rig.placed import Connection, HalfFrames, Placed
 from coupled.units import FOOT_m, PSF_Pa
 
 # JSBSim's property behind each motion channel, in the channels' order.
@@ -37,6 +44,8 @@ _LONGITUDINAL = len(LONGITUDINAL)
 PROPERTIES = dict(
     zip(LONGITUDINAL + LATERAL, LONGITUDINAL_PROPERTIES + LATERAL_PROPERTIES, strict=True)
 )
+_UNITS = {PRESSURE: PSF_Pa, SPEED: FOOT_m, ALTITUDE: FOOT_m}
+TO_SI = tuple(_UNITS.get(i, 1.0) for i in range(len(PROPERTIES)))
 
 # JSBSim's trim of each control's surface, in its commands.
 TRIMS: Mapping[ControlName, str] = {
@@ -192,96 +201,32 @@ def stepper(
 
 
 class PlainAircraft(NamedTuple):
-    """The calls of an aircraft without acting wrappers, and when to check it.
+    """An aircraft without acting wrappers, and when to check it.
 
-    Below `safe_altitude_m`, and if the height is NaN, `trouble` tells whether the flight must end.
+    Below the connection's safe altitude, and if the height is NaN, `trouble` tells whether the
+    flight must end. `nodes` are the objects whose addresses the connection has.
     """
 
-    longitudinal: Sequence[Read]
-    lateral: Sequence[Read]
-    writes: Sequence[Write]
+    connection: Connection
+    nodes: Sequence[object]
     run: Callable[[], bool]
-    safe_altitude_m: float
     trouble: Callable[[], str]
 
 
-def plain_frames(aircraft: PlainAircraft, placed: Placed) -> PlainFrames | None:
+def plain_frames(aircraft: PlainAircraft, placed: Placed) -> PlainFrames:
     """Return a loop of rig and aircraft from one frame to another, without calls in between.
 
-    It does what `motion_reader`, the rig's frame and `stepper` do, in one loop: their calls, and
-    packing the motion, cost a fifth of the rig's own time. It returns the frame reached, an earlier
-    one if the flight must end. None for rigs with two controls, of which none is shipped.
+    It returns the frame reached, an earlier one if the flight must end.
     """
-    if not aircraft.lateral and len(aircraft.writes) == 1:
-        return _column_frames(aircraft, placed)
-    return _three_frames(aircraft, placed) if len(aircraft.writes) == 3 else None
-
-
-def _column_frames(aircraft: PlainAircraft, placed: Placed) -> PlainFrames:
-    qbar, load, elevator, pitch_rate, alpha, pitch, speed, height = aircraft.longitudinal
-    ((write, trim),) = aircraft.writes
-    run, safe_m, trouble = aircraft.run, aircraft.safe_altitude_m, aircraft.trouble
-    rig_frame, address = placed.run_column, placed.address
+    placed.connect(aircraft.connection)
+    rig_frame, address, run, trouble = placed.fly, placed.address, aircraft.run, aircraft.trouble
 
     def fly(first: int, last: int) -> int:
         for k in range(first, last):
-            altitude = height() * FOOT_m
-            if not altitude > safe_m and trouble():
-                return k
-            command = rig_frame(
-                address,
-                k,
-                qbar() * PSF_Pa,
-                load(),
-                elevator(),
-                pitch_rate(),
-                alpha(),
-                pitch(),
-                speed() * FOOT_m,
-                altitude,
-            )
-            write(trim + command)
-            run()
-        return last
-
-    return fly
-
-
-def _three_frames(aircraft: PlainAircraft, placed: Placed) -> PlainFrames:
-    qbar, load, elevator, pitch_rate, alpha, pitch, speed, height = aircraft.longitudinal
-    aileron, rudder, roll_rate, yaw_rate, beta, roll, heading = aircraft.lateral
-    (write, trim), (second_write, second_trim), (third_write, third_trim) = aircraft.writes
-    run, safe_m, trouble = aircraft.run, aircraft.safe_altitude_m, aircraft.trouble
-    rig_frame, address = placed.run_all, placed.address
-
-    def fly(first: int, last: int) -> int:
-        for k in range(first, last):
-            altitude = height() * FOOT_m
-            if not altitude > safe_m and trouble():
-                return k
-            turned = heading()  # from 0 to 2π, where both mean north
-            command, second, third = rig_frame(
-                address,
-                k,
-                qbar() * PSF_Pa,
-                load(),
-                elevator(),
-                pitch_rate(),
-                alpha(),
-                pitch(),
-                speed() * FOOT_m,
-                altitude,
-                aileron(),
-                rudder(),
-                roll_rate(),
-                yaw_rate(),
-                beta(),
-                roll(),
-                turned if turned <= math.pi else turned - 2.0 * math.pi,
-            )
-            write(trim + command)
-            second_write(second_trim + second)
-            third_write(third_trim + third)
+            if rig_frame(address, k, True):
+                if trouble():
+                    return k
+                rig_frame(address, k, False)
             run()
         return last
 
@@ -289,131 +234,42 @@ def _three_frames(aircraft: PlainAircraft, placed: Placed) -> PlainFrames:
 
 
 class PlainSteps(NamedTuple):
-    """A frame in two halves, as `Frames.steps`; `begun` takes the commands of a host run again.
+    """A frame in two halves, as `Frames.steps`.
 
     `advance` is `end` of a frame under a force on the column, N, and `begin` of the next one.
     """
 
     begin: Callable[[int], str]
     end: Callable[[int, Sequence[float]], None]
-    begun: Callable[[Commands], None]
-    advance: Callable[[int, float], str] | None = None
+    advance: Callable[[int, float], str] | None
 
 
-def plain_steps(aircraft: PlainAircraft, halves: HalfFrames) -> PlainSteps | None:
+def plain_steps(aircraft: PlainAircraft, halves: HalfFrames) -> PlainSteps:
     """Return the two halves of a frame of rig and aircraft, without calls in between.
 
-    They do what `plain_frames` does. None for rigs with two controls.
+    The aircraft's commands are set with the host's, before its step.
     """
-    if not aircraft.lateral and len(aircraft.writes) == 1:
-        return _column_steps(aircraft, halves)
-    return _three_steps(aircraft, halves) if len(aircraft.writes) == 3 else None
-
-
-def _column_steps(aircraft: PlainAircraft, halves: HalfFrames) -> PlainSteps:
-    qbar, load, elevator, pitch_rate, alpha, pitch, speed, height = aircraft.longitudinal
-    ((write, trim),) = aircraft.writes
-    run, safe_m, trouble = aircraft.run, aircraft.safe_altitude_m, aircraft.trouble
-    host, loaders, address = halves.host_column, halves.loaders, halves.address
-    both, command = halves.step_column, 0.0
+    halves.placed.connect(aircraft.connection)
+    host, loaders, step, address = halves.host, halves.loaders, halves.step, halves.address
+    run, trouble = aircraft.run, aircraft.trouble
 
     def begin(k: int) -> str:
-        nonlocal command
-        altitude = height() * FOOT_m
-        if not altitude > safe_m and (why := trouble()):
-            return why
-        command = host(
-            address,
-            k,
-            qbar() * PSF_Pa,
-            load(),
-            elevator(),
-            pitch_rate(),
-            alpha(),
-            pitch(),
-            speed() * FOOT_m,
-            altitude,
-        )
+        if host(address, k, True):
+            if why := trouble():
+                return why
+            host(address, k, False)
         return ""
 
     def end(k: int, forces: Sequence[float]) -> None:
         loaders(address, k, *forces)
-        write(trim + command)
         run()
 
     def advance(k: int, force: float) -> str:
-        nonlocal command
-        write(trim + command)
         run()
-        altitude = height() * FOOT_m
-        if not altitude > safe_m and (why := trouble()):
-            return why
-        command = both(
-            address,
-            k,
-            force,
-            qbar() * PSF_Pa,
-            load(),
-            elevator(),
-            pitch_rate(),
-            alpha(),
-            pitch(),
-            speed() * FOOT_m,
-            altitude,
-        )
+        if step(address, k, force, True):
+            if why := trouble():
+                return why
+            host(address, k + 1, False)
         return ""
 
-    def begun(commands: Commands) -> None:
-        nonlocal command
-        command = commands[0]
-
-    return PlainSteps(begin, end, begun, advance)
-
-
-def _three_steps(aircraft: PlainAircraft, halves: HalfFrames) -> PlainSteps:
-    qbar, load, elevator, pitch_rate, alpha, pitch, speed, height = aircraft.longitudinal
-    aileron, rudder, roll_rate, yaw_rate, beta, roll, heading = aircraft.lateral
-    (write, trim), (second_write, second_trim), (third_write, third_trim) = aircraft.writes
-    run, safe_m, trouble = aircraft.run, aircraft.safe_altitude_m, aircraft.trouble
-    host, loaders, address = halves.host, halves.loaders, halves.address
-    command = second = third = 0.0
-
-    def begin(k: int) -> str:
-        nonlocal command, second, third
-        altitude = height() * FOOT_m
-        if not altitude > safe_m and (why := trouble()):
-            return why
-        turned = heading()  # from 0 to 2π, where both mean north
-        command, second, third = host(
-            address,
-            k,
-            qbar() * PSF_Pa,
-            load(),
-            elevator(),
-            pitch_rate(),
-            alpha(),
-            pitch(),
-            speed() * FOOT_m,
-            altitude,
-            aileron(),
-            rudder(),
-            roll_rate(),
-            yaw_rate(),
-            beta(),
-            roll(),
-            turned if turned <= math.pi else turned - 2.0 * math.pi,
-        )
-        return ""
-
-    def end(k: int, forces: Sequence[float]) -> None:
-        loaders(address, k, *forces)
-        write(trim + command)
-        second_write(second_trim + second)
-        third_write(third_trim + third)
-        run()
-
-    def begun(commands: Commands) -> None:
-        nonlocal command, second, third
-        command, second, third = commands
-
-    return PlainSteps(begin, end, begun)
+    return PlainSteps(begin, end, advance if len(aircraft.connection.commands) == 1 else None)

@@ -197,6 +197,6 @@ def _plain(steps: PlainSteps, halves: HalfFrames) -> Steps:
         try:
             change()
         finally:
-            steps.begun(halves.begin_again(k))
+            halves.begin_again(k)
 
     return Steps(steps.begin, steps.end, again, steps.advance)

@@ -1,12 +1,16 @@
 """An aircraft kept between the flights of a sweep, reset and trimmed for each.
 
-To load a T-37 takes an eighth of a flight of 20 s. JSBSim's reset avoids this, but loses some state
-of models that no property shows: the limits of hysteresis of a c172p's stall, and the moving
-aerodynamic reference point. So an aircraft is kept only for models for which a test has found each
-record to be the same to the byte after any earlier flight (`tests/flight/test_kept`), and only for
-flights that change nothing of it but its commands. In addition all properties are compared with
-those of the first trim, bit for bit, and a flight that ended early keeps no aircraft. If anything
-differs, the aircraft is loaded again.
+To load a T-37 takes an eighth of a flight of 20 s. JSBSim's reset avoids this, but does not restore
+all state. After it, a c172p's stall has no hysteresis: the reset sets the two angles of attack that
+limit it to zero, and no property sets them. The moving aerodynamic reference point is not restored
+either. An awjsra's nozzles start from their last position, as each kinematic component does; with
+their position and the wind set back, the next trim still differs by 1e-14.
+
+So an aircraft is kept only for models for which a test has found each record to be the same to the
+byte after any earlier flight (`tests/flight/test_kept`), and only for flights that change nothing
+of it but its commands. In addition all properties are compared with those of the first trim, bit
+for bit, and a flight that ended early keeps no aircraft. If anything differs, the aircraft is
+loaded again.
 """
 
 from __future__ import annotations
@@ -23,7 +27,7 @@ from coupled.flight.manoeuvre import Manoeuvre
 from coupled.flight.putback import tells
 from coupled.rig.parameters import Flight
 
-# Of JSBSim's package. A c172p's stall and an awjsra's trim differ after a reset.
+# Of JSBSim's package.
 PUT_BACK_EXACTLY = frozenset({"737", "B747", "T37", "f16"})
 # Keys of a flight section that only set its trim, or change no aircraft.
 _HARMLESS = frozenset(

@@ -144,8 +144,33 @@ def _call_at(context: Any, place: Any, address: Any, k: Any) -> Any:
     return types.float64(types.intp, types.intp, types.intp), generate
 
 
+def _read_at(context: Any, function: Any, node: Any) -> Any:
+    """Call `double function(void *)` at an address; inside kernels only."""
+
+    def generate(generator: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        whole = generator.get_value_type(types.intp)
+        kind = ir.FunctionType(generator.get_value_type(types.float64), [whole])
+        return builder.call(builder.inttoptr(arguments[0], kind.as_pointer()), arguments[1:])
+
+    return types.float64(types.intp, types.intp), generate
+
+
+def _write_at(context: Any, function: Any, node: Any, value: Any) -> Any:
+    """Call `bool function(void *, double)` at an address; inside kernels only."""
+
+    def generate(generator: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        whole, number = (generator.get_value_type(kind) for kind in (types.intp, types.float64))
+        kind = ir.FunctionType(ir.IntType(8), [whole, number])
+        done = builder.call(builder.inttoptr(arguments[0], kind.as_pointer()), arguments[1:])
+        return builder.zext(done, whole)
+
+    return types.intp(types.intp, types.intp, types.float64), generate
+
+
 pointer: Any = intrinsic(_pointer)
 call_at: Any = intrinsic(_call_at)
+read_at: Any = intrinsic(_read_at)
+write_at: Any = intrinsic(_write_at)
 carray: Any = numba.carray
 
 

@@ -331,30 +331,13 @@ def sliding_speed(
     span: float,
     load: float,
 ) -> tuple[float, float]:
-    """Return the speed at the middle of a step of `span` seconds, with any friction, in d/s.
+    """Return the speed at the middle of a step of `span` seconds, in d/s.
 
-    And the deflection of the bristles after it, d.
+    And the deflection of the bristles after it, d. For friction without a curve over the rate.
 
     `push` is the force without friction, N, `inertia` the inertia to be moved, N·s/d, `direction`
     the direction in which a rigid contact slides, `load` the load, N.
     """
-    if p.rate_nodes > 0:
-        return _speed_along(p, bent, v, push, direction, inertia, span, load)
-    return _sliding(p, bent, v, push, direction, inertia, span, load)
-
-
-@stage
-def _sliding(
-    p: FrictionParameters,
-    bent: float,
-    v: float,
-    push: float,
-    direction: float,
-    inertia: float,
-    span: float,
-    load: float,
-) -> tuple[float, float]:
-    """Return the result of `sliding_speed` for friction without a curve over the rate."""
     if p.dry == 0:
         return v + push / inertia, 0.0
     if p.stiffness > 0.0:
@@ -367,7 +350,7 @@ def _sliding(
 
 
 @seldom
-def _speed_along(
+def sliding_speed_along(
     p: FrictionParameters,
     bent: float,
     v: float,
@@ -384,7 +367,7 @@ def _speed_along(
     for _ in range(p.rate_nodes):
         slope = table[2, i]
         level = table[1, i] + slope * (v - table[0, i])
-        u, after = _sliding(p, bent, v, push - level, direction, inertia + slope, span, load)
+        u, after = sliding_speed(p, bent, v, push - level, direction, inertia + slope, span, load)
         if u < table[0, i] and i > 0:
             i -= 1
         elif u > table[0, i + 1] and i < last:

@@ -29,7 +29,13 @@ from coupled.rig.compiled import TINY, layout, stage
 from coupled.rig.declaration import Declaration, Ends
 from coupled.rig.delay import DelayParameters, DelayState, delayed, start_delay
 from coupled.rig.events import NOTHING, REST, STOP, first_event, sign
-from coupled.rig.friction import FrictionParameters, added_friction, deflect_bristles, sliding_speed
+from coupled.rig.friction import (
+    FrictionParameters,
+    added_friction,
+    deflect_bristles,
+    sliding_speed,
+    sliding_speed_along,
+)
 from coupled.rig.modification import ModificationState
 from coupled.rig.parameters import DELAY_SLOTS
 from coupled.rig.piecewise import SHAPE
@@ -166,6 +172,8 @@ def _midpoint(
         kept, damping = relaxing_mean(p, s, span)
         inertia += damping
         push -= kept + damping * v
+    if friction.rate_nodes > 0:
+        return sliding_speed_along(friction, s.bent, v, push, direction, inertia, span, s.load)
     return sliding_speed(friction, s.bent, v, push, direction, inertia, span, s.load)
 
 

@@ -1,9 +1,10 @@
 """The frame step as called by a flight: its arrays are at an address, passed only once.
 
 Passing them at every frame would cost half as much as the physics. Numbers cost, too: each some
-8 ns to pass, and 20 for a returned command. So a rig of a column alone passes the longitudinal
-motion and returns one command; other rigs pass the whole motion and return three. Both are short
-entries that store the motion beside the arrays and call one frame step, compiled once for any rig.
+8 ns to pass, and 20 for a returned command. So `Placed.connect` takes the addresses of an
+aircraft's properties: the compiled frame reads the motion there and sets the commands. Without them
+`Placed.frame` takes the whole motion and returns three commands. All entries are short: they store
+the motion beside the arrays and call one frame step, compiled once for any rig.
 
 A frame may also be run in two halves by the same frame step: the host at t_k, which writes row k of
 the record, and then hand, loader and linkage up to t_k+1, under a force that follows from that row.
@@ -11,6 +12,7 @@ the record, and then hand, loader and linkage up to t_k+1, under a force that fo
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -18,18 +20,37 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.record.channels import LONGITUDINAL, WHOLE_MOTION
-from coupled.rig.compiled import bound, call_at, carray, entry, machine_code, pointer, stage
+from coupled.record.channels import ALTITUDE, HEADING, WHOLE_MOTION
+from coupled.rig.compiled import (
+    bound,
+    call_at,
+    carray,
+    entry,
+    machine_code,
+    pointer,
+    read_at,
+    stage,
+    write_at,
+)
 from coupled.rig.control import CONTROL, CONTROL_PARAMETERS, CONTROL_STATE, ControlArray
 from coupled.rig.crossing import MOST
 from coupled.rig.frame import host_frames, run_loaders, serve_frame, start_controls
 
 Floats = NDArray[np.float64]
 Commands = tuple[float, float, float]
-_BESIDE = WHOLE_MOTION + 3  # the motion, the second and third command, and the frame rate in Hz
+_COMMAND, _RATE = WHOLE_MOTION, WHOLE_MOTION + MOST  # beside the arrays, after the motion
+_BESIDE = _RATE + 1
 # Of the addresses, shapes and flags of a flight, those that the two halves of a frame add.
 _PHASE, _KEPT_CONTROLS, _KEPT_ROW, _SUBSTEPS, _GIVEN = 10, 11, 12, 13, 14
-_PLACES = _GIVEN + MOST
+_CONNECTED, _NUMBERS = _GIVEN + MOST, _GIVEN + MOST + 1
+_PLACES = _NUMBERS + 1
+# Of a connected aircraft: functions, and how many nodes of the motion and of commands, with each.
+_READ, _WRITE, _READS, _WRITES, _READ_FROM = range(5)
+_WRITE_TO = _READ_FROM + WHOLE_MOTION
+_NODES_SIZE = _WRITE_TO + MOST
+_SAFE, _FACTOR = 0, 1  # its numbers: lowest safe altitude, factors, and commands in trim
+_TRIM = _FACTOR + WHOLE_MOTION
+_NUMBERS_SIZE = _TRIM + MOST
 _WHOLE, _HOST, _HOST_AGAIN, _LOADERS = range(4)  # the part of a frame that is run
 # The stages whose state the host changes and a second run of it would change again, in two rows of
 # neighbours with the services between; all numbers of a control have eight bytes.
@@ -55,15 +76,29 @@ _SERVICES, _SERVICES_END = _words("services", "services")
 _SURFACE, _SURFACE_END = _words("compensation", "surface")
 
 
+class Connection(NamedTuple):
+    """Where compiled code reads an aircraft's motion and sets its commands.
+
+    `read` and `write` are the addresses of functions `double read(node)` and
+    `bool write(node, double)`, which raise no error. Each node has its factor to SI (the motion),
+    or its value in trim (a control's command).
+    """
+
+    read: int
+    write: int
+    motion: Sequence[tuple[int, float]]  # in the channels' order
+    commands: Sequence[tuple[int, float]]  # in the rig's order
+    safe_altitude_m: float  # at and below it, a frame is not begun unless it must
+
+
 class Placed:
     """A flight's arrays for `step_frame_at`, kept alive: those of `step_frame`.
 
     Column 0 of the record is the time, at `frame_rate_Hz`. `real_loader`: hand and loader are
     measured, not simulated; only the host's part is computed.
 
-    `run_column` takes `address`, the frame's number and the longitudinal motion (SI, in the
-    channels' order), and returns the first control's command; `run_all` also takes the lateral
-    motion, and returns three commands.
+    `fly` runs a frame of a connected aircraft: it takes `address`, the frame's number, and whether
+    to return True, with nothing done, unless the aircraft is above its safe altitude.
     """
 
     def __init__(
@@ -77,9 +112,11 @@ class Placed:
         assert all(array.flags.c_contiguous for array in (controls, script, record))
         kernels = _kernels()
         beside = np.zeros(_BESIDE)
-        beside[-1] = frame_rate_Hz
+        beside[_RATE] = frame_rate_Hz
         before, row = np.zeros_like(controls), np.zeros(record.shape[1])
+        nodes, numbers = np.zeros(_NODES_SIZE, np.int64), np.zeros(_NUMBERS_SIZE)
         self._kept = (controls, script, record, beside, before, row)
+        self._nodes, self._numbers = nodes, numbers
         substeps = int(controls["parameters"]["clock"]["substeps"][0])
         self._place = np.array(
             [
@@ -89,18 +126,30 @@ class Placed:
                 *(real_loader, beside.ctypes.data, kernels.step_frame),
                 *(_WHOLE, before.ctypes.data, row.ctypes.data, substeps),
                 *([0] * MOST),
+                *(nodes.ctypes.data, numbers.ctypes.data),
             ]
         )
         self.address = int(self._place.ctypes.data)
-        self.run_column, self.run_all = kernels.run_column, kernels.run_all
+        self.fly, self._run = kernels.fly, kernels.run
 
     def frame(self, k: int, motion: tuple[float, ...]) -> Commands:
         """Run frame k with the whole motion, and return the surface commands of all controls."""
-        return self.run_all(self.address, k, *motion)
+        return self._run(self.address, k, *motion)
+
+    def connect(self, aircraft: Connection) -> None:
+        """Let `fly`, and the halves, read the motion of an aircraft and set its commands."""
+        read, numbers = len(aircraft.motion), self._numbers
+        written = len(aircraft.commands)
+        self._nodes[:_READ_FROM] = aircraft.read, aircraft.write, read, written
+        self._nodes[_READ_FROM : _READ_FROM + read] = [node for node, _ in aircraft.motion]
+        self._nodes[_WRITE_TO : _WRITE_TO + written] = [node for node, _ in aircraft.commands]
+        numbers[_SAFE] = aircraft.safe_altitude_m
+        numbers[_FACTOR : _FACTOR + read] = [factor for _, factor in aircraft.motion]
+        numbers[_TRIM : _TRIM + written] = [trim for _, trim in aircraft.commands]
 
     def in_halves(self, given: Sequence[int]) -> HalfFrames:
         """Return the frames in two halves; `given` are the controls whose force `finish` takes."""
-        self._place[_GIVEN:] = [i in given for i in range(MOST)]
+        self._place[_GIVEN : _GIVEN + MOST] = [i in given for i in range(MOST)]
         controls, _, record, _, before, row = self._kept
         return HalfFrames(self, controls, record, before, row)
 
@@ -108,9 +157,9 @@ class Placed:
 class HalfFrames:
     """The frames of a flight in two halves: `begin` and `finish` do what `Placed.frame` does.
 
-    `host_column`, `host` and `loaders` are the same without packing, as in `Placed`. `step_column`
-    finishes frame k and begins the next one: it takes `address`, k, the force on a given column, N,
-    and the longitudinal motion at t_k+1.
+    `host` and `loaders` are the same for a connected aircraft, with `address`; `host` as
+    `Placed.fly`. `step` finishes frame k, under a force on a given first control, N, and then does
+    what `host` does for the next frame.
     """
 
     def __init__(
@@ -121,16 +170,16 @@ class HalfFrames:
         before: ControlArray,
         row: Floats,
     ) -> None:
-        self._placed, self.address = placed, placed.address
+        self.placed, self.address = placed, placed.address
         self._controls, self._record = controls, record
         self._before, self._row = before, row
         kernels = _half_kernels()
-        self.step_column, self.host_column = kernels.step_column, kernels.host_column
-        self.host, self._again, self.loaders = kernels.host, kernels.again, kernels.loaders
+        self.step, self.host, self.loaders = kernels.step, kernels.host, kernels.loaders
+        self._begin, self._again = kernels.begin, kernels.again
 
     def begin(self, k: int, motion: tuple[float, ...]) -> Commands:
         """Run the host of frame k, which writes row k, and return the surface commands."""
-        return self.host(self.address, k, *motion)
+        return self._begin(self.address, k, *motion)
 
     def undo(self, k: int) -> None:
         """Return the host's state and row k to their values before `begin`, for a change."""
@@ -155,7 +204,7 @@ class HalfFrames:
 def step_frame_at(address: int, k: int) -> float:
     """Run `step_frame`, or one half of it, on the arrays and the motion at `address`.
 
-    Return one command; the other two are stored beside the motion.
+    The commands are stored beside the motion; the first is returned.
     """
     at = carray(pointer(address), _PLACES, np.int64)
     controls = carray(pointer(at[0]), (at[1],), CONTROL)
@@ -171,36 +220,72 @@ def step_frame_at(address: int, k: int) -> float:
         if k == 0 and at[7] == 0 and at[_PHASE] != _HOST_AGAIN:
             start_controls(controls, script)
         serve_frame(controls, motion, motion[1])
-        first, b[15], b[16] = host_frames(controls, record[k], motion)
-        record[k, 0] = k / b[17]
+        first, b[16], b[17] = host_frames(controls, record[k], motion)
+        b[15] = first
+        record[k, 0] = k / b[18]
     if (at[_PHASE] == _WHOLE or at[_PHASE] == _LOADERS) and at[7] == 0:
         run_loaders(controls, script, k, b[1])
     return first
 
 
-@entry
-def _run_column(
+@stage
+def _store(
     address: int,
-    k: int,
-    pressure: float,
-    load_factor: float,
-    elevator: float,
-    pitch_rate: float,
-    alpha: float,
-    pitch: float,
-    speed: float,
-    altitude: float,
-) -> float:
+    along: tuple[float, float, float, float, float, float, float, float],
+    beside: tuple[float, float, float, float, float, float, float],
+) -> None:
+    """Store the motion beside the arrays."""
     at = carray(pointer(address), _PLACES, np.int64)
     b = carray(pointer(at[8]), _BESIDE, np.float64)
-    b[0], b[1], b[2], b[3] = pressure, load_factor, elevator, pitch_rate
-    b[4], b[5], b[6], b[7] = alpha, pitch, speed, altitude
-    first: float = call_at(at[9], address, k)
-    return first
+    b[0], b[1], b[2], b[3], b[4], b[5], b[6], b[7] = along
+    b[8], b[9], b[10], b[11], b[12], b[13], b[14] = beside
+
+
+@stage
+def _commands(address: int) -> Commands:
+    at = carray(pointer(address), _PLACES, np.int64)
+    b = carray(pointer(at[8]), _BESIDE, np.float64)
+    return b[15], b[16], b[17]
+
+
+@stage
+def _read_motion(address: int) -> bool:
+    """Read a connected aircraft's motion; return whether it is above its safe altitude."""
+    at = carray(pointer(address), _PLACES, np.int64)
+    b = carray(pointer(at[8]), _BESIDE, np.float64)
+    nodes = carray(pointer(at[_CONNECTED]), _NODES_SIZE, np.int64)
+    numbers = carray(pointer(at[_NUMBERS]), _NUMBERS_SIZE, np.float64)
+    for i in range(nodes[_READS]):
+        b[i] = read_at(nodes[_READ], nodes[_READ_FROM + i]) * numbers[_FACTOR + i]
+    if b[HEADING] > math.pi:  # from 0 to 2π, where both mean north
+        b[HEADING] -= 2.0 * math.pi
+    above: bool = b[ALTITUDE] > numbers[_SAFE]  # not NaN
+    return above
+
+
+@stage
+def _write_commands(address: int) -> None:
+    """Set a connected aircraft's commands."""
+    at = carray(pointer(address), _PLACES, np.int64)
+    b = carray(pointer(at[8]), _BESIDE, np.float64)
+    nodes = carray(pointer(at[_CONNECTED]), _NODES_SIZE, np.int64)
+    numbers = carray(pointer(at[_NUMBERS]), _NUMBERS_SIZE, np.float64)
+    for i in range(nodes[_WRITES]):
+        write_at(nodes[_WRITE], nodes[_WRITE_TO + i], numbers[_TRIM + i] + b[_COMMAND + i])
 
 
 @entry
-def _run_all(
+def _fly(address: int, k: int, checked: bool) -> bool:
+    if not _read_motion(address) and checked:
+        return True
+    at = carray(pointer(address), _PLACES, np.int64)
+    call_at(at[9], address, k)
+    _write_commands(address)
+    return False
+
+
+@entry
+def _run(
     address: int,
     k: int,
     pressure: float,
@@ -219,18 +304,15 @@ def _run_all(
     roll: float,
     heading: float,
 ) -> Commands:
+    along = (pressure, load_factor, elevator, pitch_rate, alpha, pitch, speed, altitude)
+    _store(address, along, (aileron, rudder, roll_rate, yaw_rate, beta, roll, heading))
     at = carray(pointer(address), _PLACES, np.int64)
-    b = carray(pointer(at[8]), _BESIDE, np.float64)
-    b[0], b[1], b[2], b[3] = pressure, load_factor, elevator, pitch_rate
-    b[4], b[5], b[6], b[7] = alpha, pitch, speed, altitude
-    b[8], b[9], b[10], b[11] = aileron, rudder, roll_rate, yaw_rate
-    b[12], b[13], b[14] = beta, roll, heading
-    first: float = call_at(at[9], address, k)
-    return first, b[15], b[16]
+    call_at(at[9], address, k)
+    return _commands(address)
 
 
 @stage
-def _host_of(address: int, k: int, phase: int) -> float:
+def _host_of(address: int, k: int, phase: int) -> None:
     """Keep the host's state and row k, and run the host on the motion beside them."""
     at = carray(pointer(address), _PLACES, np.int64)
     words = at[1] * _WORDS
@@ -250,41 +332,48 @@ def _host_of(address: int, k: int, phase: int) -> float:
     for i in range(at[6]):
         row[i] = record[k, i]
     at[_PHASE] = phase
-    first: float = call_at(at[9], address, k)
+    call_at(at[9], address, k)
     at[_PHASE] = _WHOLE
-    return first
 
 
-@entry
-def _run_again(address: int, k: int) -> Commands:
+@stage
+def _loaders_of(address: int, k: int, forces: Commands) -> None:
+    """Run the loaders of frame k, with its motion, under the forces of given controls."""
     at = carray(pointer(address), _PLACES, np.int64)
-    b = carray(pointer(at[8]), _BESIDE, np.float64)
-    first = _host_of(address, k, _HOST_AGAIN)
-    return first, b[15], b[16]
+    script = carray(pointer(at[2]), (at[1], 2, at[3]), np.float64)
+    begun = k * at[_SUBSTEPS]
+    for i in range(at[1]):
+        if at[_GIVEN + i] != 0:
+            for node in range(begun + 1, begun + at[_SUBSTEPS] + 1):
+                script[i, 0, node] = forces[i]
+    at[_PHASE] = _LOADERS
+    call_at(at[9], address, k)
+    at[_PHASE] = _WHOLE
+
+
+@stage
+def _host_connected(address: int, k: int, checked: bool) -> bool:
+    if not _read_motion(address) and checked:
+        return True
+    _host_of(address, k, _HOST)
+    _write_commands(address)
+    return False
 
 
 @entry
-def _run_host_column(
-    address: int,
-    k: int,
-    pressure: float,
-    load_factor: float,
-    elevator: float,
-    pitch_rate: float,
-    alpha: float,
-    pitch: float,
-    speed: float,
-    altitude: float,
-) -> float:
-    at = carray(pointer(address), _PLACES, np.int64)
-    b = carray(pointer(at[8]), _BESIDE, np.float64)
-    b[0], b[1], b[2], b[3] = pressure, load_factor, elevator, pitch_rate
-    b[4], b[5], b[6], b[7] = alpha, pitch, speed, altitude
-    return _host_of(address, k, _HOST)
+def _host(address: int, k: int, checked: bool) -> bool:
+    return _host_connected(address, k, checked)
 
 
 @entry
-def _run_host(
+def _again(address: int, k: int) -> Commands:
+    _host_of(address, k, _HOST_AGAIN)
+    _write_commands(address)
+    return _commands(address)
+
+
+@entry
+def _begin(
     address: int,
     k: int,
     pressure: float,
@@ -303,72 +392,37 @@ def _run_host(
     roll: float,
     heading: float,
 ) -> Commands:
-    at = carray(pointer(address), _PLACES, np.int64)
-    b = carray(pointer(at[8]), _BESIDE, np.float64)
-    b[0], b[1], b[2], b[3] = pressure, load_factor, elevator, pitch_rate
-    b[4], b[5], b[6], b[7] = alpha, pitch, speed, altitude
-    b[8], b[9], b[10], b[11] = aileron, rudder, roll_rate, yaw_rate
-    b[12], b[13], b[14] = beta, roll, heading
-    first = _host_of(address, k, _HOST)
-    return first, b[15], b[16]
+    along = (pressure, load_factor, elevator, pitch_rate, alpha, pitch, speed, altitude)
+    _store(address, along, (aileron, rudder, roll_rate, yaw_rate, beta, roll, heading))
+    _host_of(address, k, _HOST)
+    return _commands(address)
 
 
 @entry
-def _run_loaders(address: int, k: int, first: float, second: float, third: float) -> None:
-    at = carray(pointer(address), _PLACES, np.int64)
-    script = carray(pointer(at[2]), (at[1], 2, at[3]), np.float64)
-    forces = (first, second, third)
-    begun = k * at[_SUBSTEPS]
-    for i in range(at[1]):
-        if at[_GIVEN + i] != 0:
-            for node in range(begun + 1, begun + at[_SUBSTEPS] + 1):
-                script[i, 0, node] = forces[i]
-    at[_PHASE] = _LOADERS
-    call_at(at[9], address, k)
-    at[_PHASE] = _WHOLE
+def _loaders(address: int, k: int, first: float, second: float, third: float) -> None:
+    _loaders_of(address, k, (first, second, third))
+
+
+@entry
+def _step(address: int, k: int, force: float, checked: bool) -> bool:
+    _loaders_of(address, k, (force, 0.0, 0.0))
+    return _host_connected(address, k + 1, checked)
 
 
 class Kernels(NamedTuple):
     """The machine code of the entries; `step_frame` is an address."""
 
     step_frame: int
-    run_column: Callable[..., float]
-    run_all: Callable[..., Commands]
-
-
-@entry
-def _step_column(
-    address: int,
-    k: int,
-    force: float,
-    pressure: float,
-    load_factor: float,
-    elevator: float,
-    pitch_rate: float,
-    alpha: float,
-    pitch: float,
-    speed: float,
-    altitude: float,
-) -> float:
-    at = carray(pointer(address), _PLACES, np.int64)
-    b = carray(pointer(at[8]), _BESIDE, np.float64)
-    script = carray(pointer(at[2]), (at[1], 2, at[3]), np.float64)
-    begun = k * at[_SUBSTEPS]
-    for node in range(begun + 1, begun + at[_SUBSTEPS] + 1):
-        script[0, 0, node] = force
-    at[_PHASE] = _LOADERS
-    call_at(at[9], address, k)  # with the motion of frame k
-    b[0], b[1], b[2], b[3] = pressure, load_factor, elevator, pitch_rate
-    b[4], b[5], b[6], b[7] = alpha, pitch, speed, altitude
-    return _host_of(address, k + 1, _HOST)
+    fly: Callable[[int, int, bool], bool]
+    run: Callable[..., Commands]
 
 
 class HalfKernels(NamedTuple):
     """The machine code of the entries of a frame's halves."""
 
-    step_column: Callable[..., float]
-    host_column: Callable[..., float]
-    host: Callable[..., Commands]
+    step: Callable[[int, int, float, bool], bool]
+    host: Callable[[int, int, bool], bool]
+    begin: Callable[..., Commands]
     again: Callable[[int, int], Commands]
     loaders: Callable[[int, int, float, float, float], None]
 
@@ -376,19 +430,18 @@ class HalfKernels(NamedTuple):
 @lru_cache(maxsize=1)
 def _kernels() -> Kernels:
     """Return the machine code, cached, since numba takes a third of a millisecond to find it."""
-    along, whole = (0.0,) * len(LONGITUDINAL), (0.0,) * WHOLE_MOTION
+    whole = (0.0,) * WHOLE_MOTION
     code = machine_code(step_frame_at, 0, 0)
-    return Kernels(code, bound(_run_column, 0, 0, *along), bound(_run_all, 0, 0, *whole))
+    return Kernels(code, bound(_fly, 0, 0, True), bound(_run, 0, 0, *whole))
 
 
 @lru_cache(maxsize=1)
 def _half_kernels() -> HalfKernels:
     """Return the machine code of the halves; few flights need it."""
-    along, whole = (0.0,) * len(LONGITUDINAL), (0.0,) * WHOLE_MOTION
     return HalfKernels(
-        bound(_step_column, 0, 0, 0.0, *along),
-        bound(_run_host_column, 0, 0, *along),
-        bound(_run_host, 0, 0, *whole),
-        bound(_run_again, 0, 0),
-        bound(_run_loaders, 0, 0, 0.0, 0.0, 0.0),
+        bound(_step, 0, 0, 0.0, True),
+        bound(_host, 0, 0, True),
+        bound(_begin, 0, 0, *(0.0,) * WHOLE_MOTION),
+        bound(_again, 0, 0),
+        bound(_loaders, 0, 0, 0.0, 0.0, 0.0),
     )

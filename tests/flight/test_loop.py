@@ -5,14 +5,12 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from coupled.flight.companion import FlightAccess
-from coupled.flight.everyframe import PlainAircraft, plain_frames
 from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import Manoeuvre
 from coupled.flight.runfile import read_run
@@ -114,17 +112,6 @@ def test_a_state_that_is_not_finite_ends_the_flight(tmp_path: Path) -> None:
     assert 0.5 < ended["time_s"] < 0.6
     assert len(record) == round(ended["time_s"] * 120)
     assert np.all(np.isfinite(record.data))
-
-
-def test_frames_in_blocks_end_where_the_height_is_not_a_number() -> None:
-    heights = iter([5000.0] * 100 + [float("nan")])
-    reads: Any = [lambda: 0.0] * 7 + [lambda: next(heights)]
-    calls: Any = (lambda: True, 100.0, lambda: "the state is not finite")
-    aircraft = PlainAircraft(reads, (), [(lambda command: None, 0.0)], *calls)
-    rig: Any = SimpleNamespace(run_column=lambda *frame: 0.0, address=0)
-    frames = plain_frames(aircraft, rig)
-    assert frames is not None
-    assert (frames(0, 64), frames(64, 128)) == (64, 100)
 
 
 class Onlooker:

@@ -92,11 +92,11 @@ def test_the_same_forces_give_the_bytes_of_fly(rig: str, configuration: Any) -> 
 def test_a_flight_longer_than_its_first_arrays_has_the_bytes_of_fly() -> None:
     noisy = COLUMN.changed({"noise.column_force_N": 0.3})
     pull = coupled.Doublet(force_N=20.0, half_period_s=0.5)
-    frames = 18 * 120
+    frames = 62 * 120
     with coupled.Session(noisy, column=pull, seed=4) as session:
         for _ in range(frames):
             session.step()
-    flown = coupled.fly(noisy, column=pull, seed=4, duration_s=18.0)
+    flown = coupled.fly(noisy, column=pull, seed=4, duration_s=62.0)
     assert session.record.data.tobytes() == flown.record.data.tobytes()
 
 
