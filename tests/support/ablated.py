@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +29,8 @@ from coupled.gap.search.evidence import Evidence
 from coupled.gap.search.found import Fit
 from coupled.gap.search.problem import Problem
 from coupled.gap.signals.output import stage_gaps, stage_limits
-from coupled.record.record import read_record
+from coupled.record.record import Record, read_record
+from coupled.rig.rig import Rig
 from coupled.rig.rigfile import read_rig
 from tests.support.rules import RULES, Rule, patched, watched, without
 from tests.support.trials import is_right
@@ -131,9 +133,12 @@ def shared(known: Known, searched: bool) -> Iterator[None]:
     def shots(self: Any) -> Any:
         return known.of(("shots", id(self)), self, lambda: plain_shots.func(self))
 
-    def prepared(rig: Any, records: Any, part: Any, *rest: Any) -> Any:
-        key = ("prepared", part.name)
-        return known.of(key, None, lambda: plain_prepare(rig, records, part, *rest))
+    def prepared(rig: Any, records: Any, part: Any, tell: Any, base: Any, *rest: Any) -> Any:
+        def make() -> Any:
+            return plain_prepare(rig, records, part, tell, base, *rest)
+
+        flight, _ = rest
+        return known.of(("prepared", part.name), None, make) if flight is None else make()
 
     def search(case: Any, library: Any) -> Any:
         if not searched:
@@ -162,9 +167,14 @@ class Runs:
     job: Job
     known: Known = field(default_factory=Known)
 
+    @cached_property
+    def read(self) -> tuple[Rig, Record]:
+        """The rig and the record."""
+        return read_rig(self.job.rig), read_record(self.job.record)
+
     def diagnosed(self, rule: Rule | None, known: Known, searched: bool) -> dict[str, Any]:
         """Return the JSON of a diagnosis without a rule, and its CPU time, `cpu_s`."""
-        rig, record = read_rig(self.job.rig), read_record(self.job.record)
+        rig, record = self.read
         start_s = known.clock_s
         with shared(known, searched), without(rule) if rule is not None else ExitStack():
             found = diagnose(rig, {str(self.job.record): record}, self.job.control, workers=1)
