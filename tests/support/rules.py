@@ -137,8 +137,6 @@ RULES = (
     Rule("doubt", "findings.answer:DOUBT", 0.0, "an incredible effect's posterior times 0.1"),
     Rule("neutral_cap", "findings.answer:has_size", gives(True),
          "below certain where the interval includes neutral"),
-    Rule("curve", "findings.credibility:part_of_a_curve", gives(0.0),
-         "two laws of speed below the filed friction are one arbitrary curve"),
     Rule("unproven", "findings.credibility:Credibility.unproven", gives(0.0),
          "less credible where the size in halves is poorly known"),
     Rule("host_drift", "findings.credibility:HOST_DRIFT", DRIFT,
