@@ -339,25 +339,6 @@ def test_a_diagnosis_blames_no_stage_by_what_is_incredible(
     assert "sensing" not in guilty
 
 
-@pytest.mark.parametrize(
-    ("error", "remains", "credible"),
-    [
-        (0.3, 0.9, False),  # halves of a breakout known to 0.3 each, beside much that remains
-        (0.3, 0.0, True),
-        (0.03, 0.9, True),
-    ],
-)
-def test_a_size_that_no_halves_know_is_not_shown_to_be_the_same(
-    error: float, remains: float, credible: bool
-) -> None:
-    """A gradient that drifts was named a breakout, whose halves were 1.06 and 1.06, each to 0.3."""
-    known = Regime("size of computed_m", 1.06, 1.06, error, error, 12)
-    worse = replace(known, low_error=2.0)
-    found = Credibility("breakout", (worse, known), 0.9, 9.0, remainder=remains)
-    assert (found.value > 0.7) is credible
-    assert found.unproven == pytest.approx(remains * math.sqrt(2.0) * error)
-
-
 def test_the_force_of_an_imposed_motion_is_no_condition_on_itself() -> None:
     """An error of the machine is larger where the measured force is larger, by selection alone."""
     rng, rate_Hz = np.random.default_rng(3), 50.0

@@ -137,8 +137,6 @@ RULES = (
     Rule("doubt", "findings.answer:DOUBT", 0.0, "an incredible effect's posterior times 0.1"),
     Rule("neutral_cap", "findings.answer:has_size", gives(True),
          "below certain where the interval includes neutral"),
-    Rule("unproven", "findings.credibility:Credibility.unproven", gives(0.0),
-         "less credible where the size in halves is poorly known"),
     Rule("host_drift", "findings.credibility:HOST_DRIFT", DRIFT,
          "a third of the drift doubts an effect of the schedule"),
     Rule("stationarity", "findings.credibility:Credibility.drift", gives(0.0),

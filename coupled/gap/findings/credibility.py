@@ -216,19 +216,9 @@ class Credibility:
         return min(1.0, least * len(self.regimes))
 
     @property
-    def unproven(self) -> float:
-        """The standard error of the best known difference, weighted by the remaining residual.
-
-        If it is large, the records do not show that the size is the same in all regimes.
-        """
-        errors = (math.hypot(one.low_error, one.high_error) for one in self.regimes)
-        return self.remainder * min(errors, default=0.0)
-
-    @property
     def value(self) -> float:
         """The credibility: 1 for a stationary size that the signals do not replace, down to 0."""
         same = 1.0 / (1.0 + (self.drift / (HOST_DRIFT if self.exact else DRIFT)) ** 4)
-        same /= 1.0 + (self.unproven / PARTLY) ** 4
         if self.exact:
             return same * (1.0 - self.remainder)
         if self.beside_flexible is None or self.against_flexible is None:
