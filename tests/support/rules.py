@@ -175,6 +175,11 @@ def called_by(caller: str) -> bool:
     return caller in ("", frame.f_code.co_name)
 
 
+def function_of(attribute: Any) -> Any:
+    """Return the function of a property; another attribute as it is."""
+    return attribute.fget if isinstance(attribute, property) else attribute
+
+
 @contextmanager
 def without(rule: Rule) -> Iterator[None]:
     """Switch a rule off within the block."""
@@ -184,7 +189,7 @@ def without(rule: Rule) -> Iterator[None]:
         with patched(owner, name, rule.off):
             yield
         return
-    original = before.fget if isinstance(before, property) else before
+    original = function_of(before)
 
     def call(*args: Any, **options: Any) -> Any:
         if called_by(rule.caller):
@@ -213,7 +218,7 @@ def watched(rules: Sequence[Rule], acted: set[str]) -> Iterator[None]:
 
 def _watching(rule: Rule, before: Any, acted: set[str]) -> Any:
     """Return a function or property that notes whether its rule acts."""
-    original = before.fget if isinstance(before, property) else before
+    original = function_of(before)
 
     def call(*args: Any, **options: Any) -> Any:
         fits = dict(args[0].fits) if rule.off is idle else {}
