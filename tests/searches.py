@@ -13,14 +13,9 @@ from pathlib import Path
 
 from scipy.stats import binomtest
 
-from coupled.blind.trials.answers import Answer, read_answers
+from coupled.blind.trials.answers import read_answers
 from coupled.blind.trials.key import read_key
-
-
-def is_right(answer: Answer) -> bool:
-    """Tell whether an answer is right by its record's kind."""
-    wanted = {"none": "no_gap", "outsider": "unexplained"}.get(answer.truth.category)
-    return answer.exact if wanted is None else answer.verdict == wanted
+from tests.support.trials import is_right
 
 
 def compare(first: Path, second: Path, key_file: Path) -> None:

@@ -15,7 +15,6 @@ from scipy import stats
 
 from coupled.gap import diagnose as diagnosing
 from coupled.gap.diagnose import diagnose
-from coupled.gap.effects.effect import apply
 from coupled.gap.effects.library import BY_NAME
 from coupled.gap.findings.answer import incredible, verdict_of
 from coupled.gap.findings.credibility import (
@@ -25,7 +24,6 @@ from coupled.gap.findings.credibility import (
     _regime,
     _size,
     credibility,
-    part_of_a_curve,
     regimes,
     remainder,
 )
@@ -339,74 +337,6 @@ def test_a_diagnosis_blames_no_stage_by_what_is_incredible(
     guilty = [stage.name for stage in diagnose(rig, {"r": record}).stages if stage.guilty]
     assert guilty
     assert "sensing" not in guilty
-
-
-FILED_N = 2.0
-STRIBECK, DAMPING = BY_NAME["stribeck_friction"], BY_NAME["viscous_damping"]
-
-
-def with_friction(running_N: float, breakaway_N: float, *others: str) -> float:
-    """Return how surely a law of friction found beside others is part of a curve of the speed."""
-    rig = bench({"controls.column.loader.friction_N": FILED_N})
-    effects = (STRIBECK, *(BY_NAME[name] for name in others))
-    values = {
-        "stribeck_friction.friction_N": running_N - FILED_N,
-        "stribeck_friction.breakaway_N": breakaway_N,
-        "stribeck_friction.stribeck_{d}_per_s": 5e-3,
-        "viscous_damping.factor": 1.3,
-        "force_offset.offset_N": 1.0,
-    }
-    found: Any = SimpleNamespace(
-        effects=effects,
-        rig=apply(rig, "column", effects, values),
-        low={key: value - 0.196 for key, value in values.items()},
-        high={key: value + 0.196 for key, value in values.items()},
-    )
-    case: Any = SimpleNamespace(nominal=rig, control="column")
-    by_effect: list[float] = [part_of_a_curve(effect, case, found) for effect in effects]
-    if "viscous_damping" in others:
-        assert by_effect[0] == by_effect[1]
-    assert by_effect[-1] == 0.0 or others[-1] == "viscous_damping"
-    return by_effect[0]
-
-
-def test_friction_below_the_filed_at_any_speed_and_a_damping_are_a_curve_of_the_speed() -> None:
-    """A damping by the square of the speed took 1.4 N of 2 off, and 0.3 N of the breakaway."""
-    assert with_friction(0.6, 1.7, "viscous_damping") > 0.99
-    assert with_friction(0.6, 1.7, "force_offset") == 0.0  # no damping: friction is less
-    assert with_friction(0.6, 1.7) == 0.0
-    assert with_friction(0.6, 3.0, "viscous_damping") < 0.01  # it breaks away
-    assert with_friction(3.0, 4.0, "viscous_damping") < 0.01
-    by_breakaway = [with_friction(1.0, at, "viscous_damping") for at in np.linspace(1.5, 2.5, 101)]
-    assert np.all(np.diff(by_breakaway) <= 0.0)
-    assert by_breakaway[50] == pytest.approx(0.5)
-    assert np.max(-np.diff(by_breakaway)) < 0.05
-
-
-def test_what_is_part_of_a_curve_is_worth_nothing() -> None:
-    worth = [replace(drifting(0.0), curve=curve).value for curve in (0.0, 0.3, 1.0)]
-    assert worth == [1.0, pytest.approx(0.7), 0.0]
-    assert "curve" not in drifting(0.0).as_dict()
-    assert replace(drifting(0.0), curve=0.3).as_dict()["curve"] == 0.3
-
-
-@pytest.mark.parametrize(
-    ("error", "remains", "credible"),
-    [
-        (0.3, 0.9, False),  # halves of a breakout known to 0.3 each, beside much that remains
-        (0.3, 0.0, True),
-        (0.03, 0.9, True),
-    ],
-)
-def test_a_size_that_no_halves_know_is_not_shown_to_be_the_same(
-    error: float, remains: float, credible: bool
-) -> None:
-    """A gradient that drifts was named a breakout, whose halves were 1.06 and 1.06, each to 0.3."""
-    known = Regime("size of computed_m", 1.06, 1.06, error, error, 12)
-    worse = replace(known, low_error=2.0)
-    found = Credibility("breakout", (worse, known), 0.9, 9.0, remainder=remains)
-    assert (found.value > 0.7) is credible
-    assert found.unproven == pytest.approx(remains * math.sqrt(2.0) * error)
 
 
 def test_the_force_of_an_imposed_motion_is_no_condition_on_itself() -> None:

@@ -10,10 +10,8 @@
    If the model can represent the effect, this share is small for correct and wrong effects alike.
    Then `against_flexible` decides: a correct effect, with one parameter, leaves no more than the
    model with a hundred. Both are omitted for effects from outside the stage, such as gusts.
-3. Two friction laws found together that put the friction below its filed value fit an arbitrary
-   curve over speed (`part_of_a_curve`).
 
-Tests 1 and 2 weigh more the more residual power remains (`remainder`). The result is one smooth
+Both tests weigh more the more residual power remains (`remainder`). The result is one smooth
 number that scales the effect's probability.
 """
 
@@ -26,9 +24,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr, stdtr, stdtrit
+from scipy.special import stdtr, stdtrit
 
-from coupled.gap.effects.effect import Effect, Parameter, Signature, touched, value_of
+from coupled.gap.effects.effect import Effect, touched
 from coupled.gap.findings.where import free_share, response, signals
 from coupled.gap.noise.smooth import smoothed
 from coupled.gap.search.case import Case
@@ -183,9 +181,6 @@ def _size(
     return more, error, 1.0 / float(held @ held)
 
 
-LAW_OF_SPEED = Signature("speed", "missing")  # signature of a force that depends on speed
-
-
 @dataclass(frozen=True)
 class Credibility:
     """Results of the tests of one effect.
@@ -193,8 +188,7 @@ class Credibility:
     `remainder` is the weight of the residual that remains, 0 to 1 (`remainder`). `beside_flexible`
     and `against_flexible` (residual power of the nonparametric model over that with the effects)
     are None if hardly any residual remains. `exact`: the stage is computed by the host without
-    noise, so the limit of the drift is lower and no residual may remain. `curve` is the
-    probability that the effect is part of an arbitrary curve over speed (`part_of_a_curve`).
+    noise, so the limit of the drift is lower and no residual may remain.
     """
 
     effect: str
@@ -203,7 +197,6 @@ class Credibility:
     against_flexible: float | None = None
     remainder: float = 0.0
     exact: bool = False
-    curve: float = 0.0
 
     @property
     def drift(self) -> float:
@@ -223,19 +216,9 @@ class Credibility:
         return min(1.0, least * len(self.regimes))
 
     @property
-    def unproven(self) -> float:
-        """The standard error of the best known difference, weighted by the remaining residual.
-
-        If it is large, the records do not show that the size is the same in all regimes.
-        """
-        errors = (math.hypot(one.low_error, one.high_error) for one in self.regimes)
-        return self.remainder * min(errors, default=0.0)
-
-    @property
     def value(self) -> float:
         """The credibility: 1 for a stationary size that the signals do not replace, down to 0."""
         same = 1.0 / (1.0 + (self.drift / (HOST_DRIFT if self.exact else DRIFT)) ** 4)
-        same *= (1.0 - self.curve) / (1.0 + (self.unproven / PARTLY) ** 4)
         if self.exact:
             return same * (1.0 - self.remainder)
         if self.beside_flexible is None or self.against_flexible is None:
@@ -250,8 +233,6 @@ class Credibility:
         if self.beside_flexible is not None:
             found |= {"remainder": self.remainder, "beside_flexible": self.beside_flexible}
             found["against_flexible"] = self.against_flexible
-        if self.curve > 0.0:
-            found["curve"] = self.curve
         return found | {"regimes": [one.as_dict() for one in self.regimes]}
 
 
@@ -281,8 +262,7 @@ def credibility(
         left = output.residual(found.rig)
         action = output.residual(without) - left
         acts.append(Acts(output, records[output.record], action, left))
-    curve = part_of_a_curve(effect, case, found)
-    plain = Credibility(effect.name, regimes(case, acts), remainder=remains, curve=curve)
+    plain = Credibility(effect.name, regimes(case, acts), remainder=remains)
     if effect.stage == "schedule":
         return replace(plain, exact=True)
     if remains < FEW or not acts or effect.signature.drawing == "time":
@@ -290,36 +270,6 @@ def credibility(
     most = max(acts, key=lambda one: float(one.action @ one.action))
     beside, against = _flexible(case, found, most)
     return replace(plain, beside_flexible=beside, against_flexible=against)
-
-
-def part_of_a_curve(effect: Effect, case: Case, found: Fit) -> float:
-    """Return the probability that an effect is part of an arbitrary curve over speed, 0 to 1.
-
-    Stribeck friction and damping together have four parameters and fit almost any curve. They are
-    a breakaway only if the fitted friction exceeds the filed one. A fitted friction below the
-    filed one at all speeds imitates another law.
-    """
-    by_speed = [one for one in found.effects if one.free and one.signature == LAW_OF_SPEED]
-    if effect not in by_speed or len(by_speed) < 2:
-        return 0.0
-    below = (_surely_below(case, found, one, p) for one in by_speed for p in one.free if p.above)
-    return max(below, default=0.0)
-
-
-def _surely_below(case: Case, found: Fit, law: Effect, breakaway: Parameter) -> float:
-    """Return the probability that the fitted friction is below the filed one at all speeds."""
-    assert breakaway.above
-    sure = 1.0
-    filed = max(
-        float(value_of(case.nominal, case.control, k)) for k in (breakaway.above, breakaway.key)
-    )
-    for p in law.free:
-        if p.key in (breakaway.above, breakaway.key):
-            key = law.value_key(p)
-            error = (found.high[key] - found.low[key]) / (2.0 * 1.96)
-            less = filed - float(value_of(found.rig, case.control, p.key))
-            sure *= float(ndtr(less / error)) if error > 0.0 else float(less > 0.0)
-    return sure
 
 
 def _flexible(case: Case, found: Fit, one: Acts) -> tuple[float, float]:

@@ -1,0 +1,253 @@
+"""The rules of the diagnosis beyond its design, each with the one place that switches it off.
+
+`tests.ablation` measures what each is worth.
+"""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+from coupled.gap.findings.credibility import remainder
+from coupled.gap.search.found import Fit
+from coupled.gap.search.screen import Worth
+from coupled.gap.signals.output import Output, stage_gaps
+from coupled.gap.thresholds import DRIFT, LENGTHS, PRIOR_EFFECT
+
+Off = Callable[..., Any]
+Original = Callable[..., Any]
+
+
+def gives(value: Any) -> Off:
+    """Return a function that takes the place of a rule, and returns a constant."""
+    return lambda original, *args, **options: value
+
+
+def same(original: Original, first: Any, *args: Any, **options: Any) -> Any:
+    """Take the place of a rule that changes its argument: return the argument."""
+    return first
+
+
+def second(original: Original, first: Any, argument: Any, *args: Any, **options: Any) -> Any:
+    """Take the place of a method that changes its argument: return the argument."""
+    return argument
+
+
+def idle(original: Original, *args: Any, **options: Any) -> None:
+    """Take the place of a rule that only adds fits to a beam."""
+
+
+def without_relief(original: Original, beam: Any, names: frozenset[str]) -> Worth:
+    """Return the worth of a candidate, without the penalty that it may remove."""
+    behind = beam.log(beam.best) - beam.log(names) if names else 0.0
+    return Worth(PRIOR_EFFECT + behind, beam.counts)
+
+
+def first_only(original: Original, *args: Any, **options: Any) -> Any:
+    """Return the first of the starts that a rule returns."""
+    return original(*args, **options)[:1]
+
+
+@dataclass(frozen=True)
+class Rule:
+    """A rule, and the one place that switches it off.
+
+    `place` is "module:name" below `coupled.gap`, where the name is looked up; `off` takes the place
+    of the function there, is given the original and its arguments, or is the constant's other
+    value. With a `caller`, only calls by this function are without the rule.
+    """
+
+    name: str
+    place: str
+    off: Any
+    what: str
+    caller: str = ""
+    fresh: bool = False  # it acts before the search, or within a fit: nothing is used again
+
+    @property
+    def after_search(self) -> bool:
+        """Whether the rule acts on the results of the search only."""
+        return self.place.startswith(("findings.", "diagnose:"))
+
+    def owner(self) -> tuple[Any, str]:
+        """Return the module or class that holds the name, and the name."""
+        module, _, name = self.place.partition(":")
+        *outer, last = name.split(".")
+        owner: Any = importlib.import_module(f"coupled.gap.{module}")
+        for one in outer:
+            owner = getattr(owner, one)
+        return owner, last
+
+
+RULES = (
+    Rule("needed", "search.beam:Beam._needed", gives(frozenset()),
+         "an effect whose interval includes neutral is kept if all simpler sets lose by 5"),
+    Rule("last_swaps", "search.beam:_sets_with_swap", gives([]),
+         "swaps in the best set, at the end", "_fit_neighbours_of_best"),
+    Rule("two_for_one", "search.beam:_fit_with_simpler_law", gives(None),
+         "two effects of fewer parameters in place of a law of several"),
+    Rule("restarts", "search.beam:_restart_simple_sets", idle,
+         "restarts of simpler sets with friction, at the end"),
+    Rule("pairs", "search.screen:Screen.pair", gives(None),
+         "two effects added at once where no single one is worth a fit"),
+    Rule("discrete", "search.beam:_fit_sets", gives([]),
+         "discrete effects are fitted without screening", "_search_by_depth"),
+    Rule("relief", "search.beam:Beam.worth", without_relief,
+         "screening deducts the nuisance parameters' penalty"),
+    Rule("tolerance", "search.problem:Problem.within_tolerance", second,
+         "effects are screened with nuisance parameters within their tolerance",
+         "_fit_neighbours"),
+    Rule("new_contact", "search.case:Case.but_for_contact",
+         lambda original, case, values: dict(values),
+         "the best set is fitted again from a new presliding grid"),
+    Rule("contact_once", "search.beam:_contact_values", gives({}),
+         "laws of friction start from presliding parameters fitted before"),
+    Rule("named_contact", "search.beam:_name_law_with_contact", second,
+         "Coulomb friction with presliding is named presliding friction"),
+    Rule("grid", "search.case:contact_start",
+         lambda original, cost, most, elastic: (LENGTHS[1] * most, 0.0),
+         "presliding parameters start from a grid search", fresh=True),
+    Rule("shooting", "search.beam:_fit_by_multiple_shooting", idle,
+         "friction is also started from multiple shooting"),
+    Rule("higher_breakaway", "search.beam:_starts_with_other_law", first_only,
+         "a wider friction law is also started with a breakaway half as high again"),
+    Rule("colour", "search.problem:Problem.without_colour_allowance", same,
+         "a stage with a gap loses the allowance for unknown noise colour"),
+    Rule("sensor_stamps", "search.case:Case._driven_over_limit", gives(()),
+         "a sensor's nuisance parameter is also fitted to an output that it can disturb",
+         fresh=True),
+    Rule("contact_error", "prepare:allowing_for_contact", same,
+         "a filed friction raises the loader's limit by 3 % of its gap", fresh=True),
+    Rule("exact_laws", "search.problem:EXACT", (),
+         "schedule, compensation and linkage have no model error in the evidence"),
+    Rule("exact_open", "search.beam:EXACT", (),
+         "an exact stage is explained only within its limit"),
+    Rule("onset", "search.histories:_search_with_onset", gives(None),
+         "the search is repeated with an effect that begins within the record"),
+    Rule("noise_passed", "search.case:Case.gaps",
+         lambda original, case, rig: stage_gaps(case.outputs, rig),
+         "a gap counts by the higher noise floor of the filed rig and this one"),
+    Rule("stated_most", "findings.answer:STATED_MOST", 1.0,
+         "no probability above 0.89"),
+    Rule("sure", "findings.answer:SURE", 1.0, "a credible effect's posterior times 0.97"),
+    Rule("neutral_cap", "findings.answer:has_size", gives(True),
+         "below certain where the interval includes neutral"),
+    Rule("host_drift", "findings.credibility:HOST_DRIFT", DRIFT,
+         "a third of the drift doubts an effect of the schedule"),
+    Rule("stationarity", "findings.credibility:Credibility.drift", gives(0.0),
+         "the stationarity test (point 8)"),
+    Rule("flexible", "findings.credibility:_flexible", gives((0.0, 0.0)),
+         "the comparison with a nonparametric model (point 8)"),
+    Rule("own_error", "findings.result:remainder",
+         lambda original, gap, left, below, own: remainder(gap, left, below),
+         "what even a nonparametric model leaves is no evidence against an effect"),
+    Rule("hidden", "findings.judge:Judge._hidden", gives(None),
+         "a stage whose noise floor may hide a gap is not judged"),
+    Rule("doubted_stage", "diagnose:incredible", gives(frozenset()),
+         "an incredible effect does not make a stage without output faulty"),
+    Rule("incredible_rivals", "findings.answer:incredible", gives(frozenset()),
+         "mostly, not ambiguous, where only incredible effects have alternatives"),
+    Rule("together", "findings.answer:_held_together", gives(0.0),
+         "mostly where the certain effects hold half of all gaps together"),
+)  # fmt: skip
+
+
+@contextmanager
+def patched(owner: Any, name: str, value: Any) -> Iterator[None]:
+    """Replace an attribute within the block."""
+    before = vars(owner)[name]
+    setattr(owner, name, value)
+    try:
+        yield
+    finally:
+        setattr(owner, name, before)
+
+
+def called_by(caller: str) -> bool:
+    """Tell whether the function that called a wrapper of this file has a name; "" is any."""
+    frame = sys._getframe(1)
+    while frame.f_code.co_filename == __file__ and frame.f_back is not None:
+        frame = frame.f_back
+    return caller in ("", frame.f_code.co_name)
+
+
+def function_of(attribute: Any) -> Any:
+    """Return the function of a property; another attribute as it is."""
+    return attribute.fget if isinstance(attribute, property) else attribute
+
+
+@contextmanager
+def without(rule: Rule) -> Iterator[None]:
+    """Switch a rule off within the block."""
+    owner, name = rule.owner()
+    before = vars(owner)[name]
+    if not callable(rule.off):
+        with patched(owner, name, rule.off):
+            yield
+        return
+    original = function_of(before)
+
+    def call(*args: Any, **options: Any) -> Any:
+        if called_by(rule.caller):
+            return rule.off(original, *args, **options)
+        return original(*args, **options)
+
+    with patched(owner, name, property(call) if isinstance(before, property) else call):
+        yield
+
+
+@contextmanager
+def watched(rules: Sequence[Rule], acted: set[str]) -> Iterator[None]:
+    """Add to `acted` the rules that change a result within the block.
+
+    A rule that is a constant counts as acting always.
+    """
+    with ExitStack() as stack:
+        for rule in rules:
+            if callable(rule.off):
+                owner, name = rule.owner()
+                stack.enter_context(patched(owner, name, _watching(rule, vars(owner)[name], acted)))
+            else:
+                acted.add(rule.name)
+        yield
+
+
+def _watching(rule: Rule, before: Any, acted: set[str]) -> Any:
+    """Return a function or property that notes whether its rule acts."""
+    original = function_of(before)
+
+    def call(*args: Any, **options: Any) -> Any:
+        fits = dict(args[0].fits) if rule.off is idle else {}
+        result = original(*args, **options)
+        if rule.name not in acted and called_by(rule.caller):
+            if rule.off is idle:
+                now = args[0].fits
+                changes = now.keys() != fits.keys() or any(now[k] is not fits[k] for k in now)
+            else:
+                other = rule.off(lambda *_, **__: result, *args, **options)
+                changes = differs(result, other)
+            if changes:
+                acted.add(rule.name)
+        return result
+
+    return property(call) if isinstance(before, property) else call
+
+
+def differs(one: Any, other: Any) -> bool:
+    """Tell whether two results of a rule's function differ; true if they cannot be compared."""
+    if one is other:
+        return False
+    if isinstance(one, Worth) and isinstance(other, Worth):
+        return one.least != other.least
+    if isinstance(one, Fit) and isinstance(other, Fit):
+        return dict(one.values) != dict(other.values)
+    if isinstance(one, Output) and isinstance(other, Output):
+        return one.limit != other.limit
+    try:
+        return bool(one != other)
+    except ValueError:
+        return True
