@@ -199,6 +199,7 @@ class Sensing(Section):
     gradient_skew: float = quantity("s", 0.0, ge=0)
     deflection_curve: DeflectionReading = DeflectionReading()
     force_curve: ForceReading = ForceReading()
+    grip_curve: DeflectionReading = DeflectionReading()
 
     @property
     def read_scale(self) -> float:

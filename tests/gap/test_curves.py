@@ -33,6 +33,16 @@ def by_the_square(twin: Twin, time_s: float, pressure_Pa: float) -> None:
     twin.set(quadratic_damping=QUADRATIC)
 
 
+def reads_by_the_square(twin: Twin, time_s: float, pressure_Pa: float) -> None:
+    """Let the transducer at the grip read δ + 0.6·δ²."""
+    twin.set(read_square=0.6)
+
+
+def bends_unlike(twin: Twin, time_s: float, pressure_Pa: float) -> None:
+    """Bend more in a pull than in a push."""
+    twin.set(bend_uneven=2e-5)
+
+
 def wrong_entry(twin: Twin, time_s: float, pressure_Pa: float) -> None:
     twin.numbers[0]["first"][ENTRY] = WRONG * TABLE.total_gradient[ENTRY]
 
@@ -73,6 +83,25 @@ def test_damping_by_the_square_of_the_speed_is_a_curve_over_the_rate() -> None:
     assert whole == pytest.approx(QUADRATIC * rate**2, abs=between, rel=0.1)
     assert np.all(np.array(curve.low) <= curve.values)
     assert np.all(np.array(curve.high) >= curve.values)
+
+
+@pytest.mark.parametrize(
+    ("fault", "key", "like"),
+    [
+        (reads_by_the_square, "sensing.grip_curve", "c·δ²"),
+        (bends_unlike, "loader.bend_curve", "c·|F|"),
+    ],
+)
+def test_a_law_of_the_linkage_is_a_curve_over_its_own_signal(
+    fault: Fault, key: str, like: str
+) -> None:
+    rig = RIG.changed({"controls.column.loader.bend_m_per_N": 9e-5})
+    found = curves_of(recorded(fault, rig=rig), rig)
+    assert found is not None
+    (curve,) = found.found
+    assert (curve.key, curve.stage) == (f"controls.column.{key}", "linkage")
+    assert curve.like == like
+    assert curve.closed > 0.9
 
 
 @pytest.fixture(scope="module")
@@ -133,6 +162,14 @@ def test_a_reading_is_inverted_along_its_curve(first: float) -> None:
     true = np.linspace(-0.04, 0.04, 41)
     assert not np.allclose(sensed.along_curve(true), true)
     assert sensed.before_curve(sensed.along_curve(true)) == pytest.approx(true, abs=1e-7)
+    table = {"deflection_m": nodes, "reading_m": reading}
+    changes = {"grip_curve": table, "deflection_zero_m": 0.01}
+    at_grip = Sensed(
+        RIG.changed({f"controls.column.sensing.{key}": value for key, value in changes.items()}),
+        "column",
+    )
+    assert at_grip.at_grip(true) == pytest.approx(sensed.along_curve(true) + 0.01)
+    assert at_grip.from_grip(at_grip.at_grip(true)) == pytest.approx(true, abs=1e-7)
 
 
 def test_curves_are_written_to_an_improved_rig_only(tmp_path: Path) -> None:

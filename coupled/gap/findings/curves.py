@@ -27,7 +27,15 @@ from coupled.gap.chain import BY_NAME as STAGE_OF
 from coupled.gap.chain import stage_of
 from coupled.gap.findings.budget import ChannelShrink, channel_shrink
 from coupled.gap.findings.credibility import Acts, regimes
-from coupled.gap.findings.curvefit import Basis, Pick, Values, choose, closed_form, with_nodes
+from coupled.gap.findings.curvefit import (
+    Basis,
+    Pick,
+    Values,
+    choose,
+    closed_form,
+    straight,
+    with_nodes,
+)
 from coupled.gap.findings.curvelaws import (
     LAWS,
     Law,
@@ -40,6 +48,7 @@ from coupled.gap.findings.curvelaws import (
 )
 from coupled.gap.findings.result import EffectResult
 from coupled.gap.findings.where import signals
+from coupled.gap.noise.smooth import smoothed
 from coupled.gap.search.case import Case
 from coupled.gap.search.evidence import Evidence, evidence, fewest_unexplained, misfit
 from coupled.gap.search.found import Choice, Fit
@@ -177,7 +186,6 @@ class _Made:
     rig: Rig
     basis: Basis
     pick: Pick
-    line: Pick
     likelihood: float
 
 
@@ -260,7 +268,10 @@ class _Fitter:
             record, left = self.records[output.record], output.residual(self.rig)
             stage = "loader" if law.stage == "sensing" else law.stage
             shown = signals(output, left, record, control, stage)
-            each = shown.get(named(law.signal, control))
+            name = named(law.signal, control)
+            if name not in shown and (own := f"{control}_{name}") in record:
+                shown[name] = smoothed(record[own])
+            each = shown.get(name)
             if each is None or np.ptp(each) <= 0.0:
                 return None
             if law.stage == "surface":
@@ -294,12 +305,12 @@ class _Fitter:
         basis = self._basis(law, places, outputs, about)
         if basis is None:
             return None
-        pick, line = choose(basis, basis.sums("fitted"), self._entries(law))
+        pick = choose(basis, basis.sums("fitted"), self._entries(law))
         values = pick.values(basis)
         rig = self._with(law, values)
         if rig is None:
             return None
-        return _Made(law, values, rig, basis, pick, line, self._likelihood(basis, rig))
+        return _Made(law, values, rig, basis, pick, self._likelihood(basis, rig))
 
     def _basis(
         self, law: Law, places: Floats, outputs: Sequence[Output], about: Values | None
@@ -383,7 +394,8 @@ class _Fitter:
 
     def _bent(self, made: _Made) -> bool:
         """Tell whether a curve has more evidence than a straight line."""
-        return made.pick.known.log > made.line.known.log + RIVAL_GAIN
+        line = straight(made.basis, made.basis.sums("fitted"))
+        return made.pick.known.log > line + RIVAL_GAIN
 
     def _stated(self, made: _Made, rig: Rig, pick: Pick) -> Curve | None:
         """Return a curve with its tests; None if it fails one."""
