@@ -11,9 +11,14 @@ import pytest
 from coupled.blind.twin.twin import Twin
 from coupled.gap.chain import Part
 from coupled.gap.diagnose import findings
+from coupled.gap.findings.curvefit import Basis, choose, closed_form
+from coupled.gap.findings.curvelaws import LAWS
+from coupled.gap.findings.curves import response_to_force
 from coupled.gap.findings.diagnosis import PartDiagnosis
+from coupled.gap.noise.smooth import smoothed
 from coupled.gap.prepare import prepare
 from coupled.gap.search.beam import search_sets
+from coupled.gap.signals.output import Output
 from coupled.gap.signals.reading import Sensed
 from coupled.plots.curves import draw_curves
 from coupled.plots.gapview import View
@@ -203,3 +208,32 @@ def test_the_rig_with_curves_is_written_and_explains_the_record(tmp_path: Path) 
     assert not read_rig(tmp_path / "plain.toml").controls["column"].schedule.gradient_curve.nodes
     again = coupled(tmp_path, "diagnose", "r.csv", "--rig", "./new.toml")
     assert "No gap" in again.stdout
+
+
+def test_a_force_in_proportion_to_the_deflection_is_answered_as_a_spring() -> None:
+    record = recorded(healthy)
+    case = prepare(RIG, {"record": record}, Part("column")).case
+    (output,) = (one for one in case.outputs if one.stage == "loader")
+    place = smoothed(record["column_computed_m"])
+    answer = response_to_force(RIG, "column", record, output, 20.0 * place)
+    key = "controls.column.loader.force_curve"
+    spring = {"deflection_m": [-1.0, 0.0, 1.0], "force_N": [-20.0, 0.0, 20.0]}
+    sprung = output.residual(RIG) - output.residual(RIG.changed({key: spring}))
+    assert np.std(sprung) > 2.0
+    assert np.std(answer - sprung) < 0.06 * np.std(sprung)  # a frame late, it is 0.1
+
+
+@pytest.mark.parametrize("two", [True, False])
+def test_a_closed_form_of_two_signals_is_named_if_it_fits_best(two: bool) -> None:
+    rng = np.random.default_rng(3)
+    place, rate = np.sin(np.arange(2400) / 50.0), rng.standard_normal(2400)
+    law = next(one for one in LAWS if one.key == "loader.force_curve")
+    places = np.linspace(-1.0, 1.0, 21)
+    hats = np.array([np.interp(place, places, unit) for unit in np.eye(21)]).T
+    product = place * np.abs(rate)
+    wanted = 20.0 * (product if two else place**3) + rng.standard_normal(2400)
+    output = Output("loader", "column_computed_m", wanted, lambda rig: 0.0 * wanted, 1.0, 100.0)
+    basis = Basis(law, places, [output], [hats], [wanted], np.ones(1))
+    pick = choose(basis, basis.sums("all"), ())
+    other = {"c·δ·|v|": [product]}
+    assert closed_form(basis, pick, (), other) == ("c·δ·|v|" if two else "c·δ³")

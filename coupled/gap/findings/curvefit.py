@@ -10,7 +10,7 @@ slope at node i, h_i the mean width beside it. The log evidence of a linear mode
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -250,15 +250,26 @@ def _grown(basis: Basis, sums: Sums, start: Pick, ends: set[int]) -> Pick:
 Form = tuple[str, Floats]
 
 
-def closed_form(basis: Basis, curve: Pick, entries: Sequence[float]) -> str:
+def closed_form(
+    basis: Basis, curve: Pick, entries: Sequence[float], others: Mapping[str, Sequence[Floats]]
+) -> str:
     """Return the closed form with the largest evidence, if that is as large as the curve's.
 
-    Beside it, a straight line is free: its slope and its level are effects of the library.
+    Beside it, a straight line is free: its slope and its level are effects of the library. `others`
+    are forms of more than the law's signal, by name, as the responses of each output, in floors.
     """
-    sums, places = basis.sums("all"), basis.places
-    lines = [np.empty((len(places), 0)), *_lines(basis)]
+    columns = [
+        np.column_stack((own, *(each[k] for each in others.values())))
+        for k, own in enumerate(basis.columns)
+    ]
+    sums = replace(basis, columns=columns).sums("all")
+    unit = np.eye(len(basis.places) + len(others))
+    on_places = unit[:, : len(basis.places)]
+    forms = [(name, on_places @ form) for name, form in _forms(basis.law, basis.places, entries)]
+    forms += zip(others, unit[len(basis.places) :, :, None], strict=True)
+    lines = [np.empty((len(unit), 0)), *(on_places @ line for line in _lines(basis))]
     best, name = curve.known.log - RIVAL_GAIN, ""
-    for text, form in _forms(basis.law, places, entries):
+    for text, form in forms:
         for line in lines:
             log = _log_of(sums.of(np.column_stack((form, line))))
             if log > best:

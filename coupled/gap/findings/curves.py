@@ -60,6 +60,9 @@ from coupled.gap.signals.output import (
     stage_gaps,
     stage_limits,
 )
+from coupled.gap.signals.reading import LOAD
+from coupled.gap.stages.stages import Reader
+from coupled.gap.stages.surfaces import surface_points
 from coupled.gap.thresholds import (
     CERTAIN,
     CURVE_CLOSES,
@@ -71,7 +74,7 @@ from coupled.gap.thresholds import (
     RIVAL_GAIN,
 )
 from coupled.parallel import in_threads
-from coupled.record.channels import unit_of
+from coupled.record.channels import ControlName, unit_of
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
 from coupled.rig.surface import share_of_travel
@@ -422,9 +425,24 @@ class _Fitter:
             closed=held.closed,
             closed_low=held.low,
             closed_high=held.high,
-            like=closed_form(made.basis, pick, self._entries(law)),
+            like=closed_form(made.basis, pick, self._entries(law), self._of_two_signals(made)),
             lists=lists,
         )
+
+    def _of_two_signals(self, made: _Made) -> dict[str, list[Floats]]:
+        """Return the responses to a force in proportion to δ·|v|, by name; none of other stages."""
+        outputs, control = made.basis.outputs, self.case.control
+        if made.law.stage != "loader":
+            return {}
+        found = []
+        for output in outputs:
+            record = self.records[output.record]
+            known = signals(output, output.residual(self.rig), record, control, "loader")
+            d = unit_of(control)
+            force = known[f"computed_{d}"] * np.abs(known[f"computed_rate_{d}_per_s"])
+            size = self._step(made.law, outputs) / float(np.sqrt(np.mean(force**2)))
+            found.append(response_to_force(self.rig, control, record, output, size * force))
+        return {"c·δ·|v|": found}
 
     def _drift(self, rig: Rig, outputs: Sequence[Output]) -> float:
         """Return the largest significant difference of a curve's size between halves."""
@@ -437,3 +455,23 @@ class _Fitter:
         halves = regimes(self.case, acts)
         chance = DRIFT_CHANCE / max(len(halves), 1)
         return max((one.apart(chance) for one in halves), default=0.0)
+
+
+def response_to_force(
+    rig: Rig, control: ControlName, record: Record, output: Output, force: Floats
+) -> Floats:
+    """Return an output's response to a force against δc, N at the frames, in floors.
+
+    The force is that of a bob weight of 1 N/g, whose load factor is the force; those of rig and
+    record are left out of the difference.
+    """
+    kept = [name for name in record.channels if name != LOAD]
+    data = np.column_stack((*(record[name] for name in kept), 1.0 + force))
+    loaded = replace(record, channels=(*kept, LOAD), data=data)
+    reader = Reader(rig, loaded, control, surface_points, output.record)
+    made = next((one for one in reader.outputs() if one.channel == output.channel), None)
+    if made is None or output.stage != "loader":
+        return np.zeros(len(output.measured))
+    key = f"controls.{control}.loader.bob_weight_N_per_g"
+    moved = made.predict(rig.changed({key: 1.0})) - made.predict(rig.changed({key: 0.0}))
+    return np.asarray(moved / output.floor)
