@@ -98,6 +98,11 @@ class FrictionCurve(Curve):
     force: list[float] = quantity("N", [])
     force_push: list[float] = quantity("N", [])
 
+    @property
+    def forward(self) -> list[float]:
+        """The force at each rate of motion forward, N."""
+        return self.force_push or self.force
+
 
 class LoadCurve(Curve):
     """Dry friction by the size of the force carried, added to the friction."""

@@ -95,7 +95,7 @@ def with_curve(
         nodes = np.concatenate(([nodes[0] - beyond], nodes, [nodes[-1] + beyond]))
         given = np.pad(values, 1, "edge")
     if kind.MAP or kind is BendCurve:
-        line = nodes * (1.0 if kind.MAP else _least_bend(rig, control))
+        line = nodes * (1.0 if kind.MAP else rig.controls[control].loader.least_bend)
         raised = np.maximum.accumulate(values + line)
         given = raised if kind.MAP else raised - line - np.interp(0.0, nodes, raised - line)
     if kind is LoadCurve:
@@ -108,13 +108,6 @@ def with_curve(
         return rig.changed({f"controls.{control}.{law.key}": lists})
     except InputError:
         return None
-
-
-def _least_bend(rig: Rig, control: ControlName) -> float:
-    """Return the least bend by the force that a rig has without a curve, d/N."""
-    loader = rig.controls[control].loader
-    push = loader.bend if loader.bend_push is None else loader.bend_push
-    return 0.0 if loader.bend_limit > 0.0 else min(loader.bend, push)
 
 
 def rising(places: Floats) -> Floats:

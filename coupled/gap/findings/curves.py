@@ -465,13 +465,13 @@ def response_to_force(
     The force is that of a bob weight of 1 N/g, whose load factor is the force; those of rig and
     record are left out of the difference.
     """
+    if output.stage != "loader":
+        return np.zeros(len(output.measured))
     kept = [name for name in record.channels if name != LOAD]
     data = np.column_stack((*(record[name] for name in kept), 1.0 + force))
     loaded = replace(record, channels=(*kept, LOAD), data=data)
     reader = Reader(rig, loaded, control, surface_points, output.record)
-    made = next((one for one in reader.outputs() if one.channel == output.channel), None)
-    if made is None or output.stage != "loader":
-        return np.zeros(len(output.measured))
+    made = next(one for one in reader.outputs() if one.channel == output.channel)
     key = f"controls.{control}.loader.bob_weight_N_per_g"
     moved = made.predict(rig.changed({key: 1.0})) - made.predict(rig.changed({key: 0.0}))
     return np.asarray(moved / output.floor)
