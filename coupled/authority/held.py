@@ -45,6 +45,7 @@ def true_deflection(rig: Rig, control: ControlName, record: Record) -> Floats:
     """Return the deflection δ at the grip in d, from the transducer's reading: eq. (15)."""
     data = rig.controls[control]
     read = record[channel(control, "deflection")] - data.sensing.deflection_zero
+    read = data.sensing.grip_curve.inverse(read)
     if data.loader.arc_geometry:
         read = data.length * np.arcsin(np.clip(read / data.length, -1.0, 1.0))
     return np.asarray(read)
@@ -72,8 +73,8 @@ def loader_rests(rig: Rig, control: ControlName, record: Record) -> bool:
 def breakaway_force(loader: Loader) -> float:
     """Return the breakaway force of a loader's dry friction, N."""
     curve = loader.friction_curve
-    ahead, back = curve.force[:1] or [0.0], curve.force_push[:1] or curve.force[:1] or [0.0]
-    added = max(loader.friction_pull + ahead[0], loader.friction_push + back[0])
+    aft, forward = (curve.force[0], curve.forward[0]) if curve.nodes else (0.0, 0.0)
+    added = max(loader.friction_pull + aft, loader.friction_push + forward)
     return max(max(loader.friction, loader.breakaway) + added, 0.0)
 
 

@@ -18,6 +18,8 @@ from coupled.schema import Section, file_keys, quantity
 
 Floats = NDArray[np.float64]
 MOST_NODES = 24  # of a curve
+FAR = 10.0  # of a curve's length, up to which it is inverted beyond its ends
+FLAT_SLOPE = 1e-6  # of a map where it is flat, to be inverted
 
 
 class Curve(Section):
@@ -56,6 +58,17 @@ class Curve(Section):
         found = values[left] + slope[left] * (size - nodes[left])
         return np.asarray(np.sign(given) * found if self.odd else found)
 
+    def inverse(self, values: Floats) -> Floats:
+        """Return the signals at which a map has given values; where it is flat, one of them."""
+        if not self.nodes:
+            return values
+        nodes = np.array(self.nodes)
+        far = nodes[-1] + FAR * max(float(nodes[-1] - nodes[0]), float(np.ptp(values)))
+        least = -far if self.odd else 2.0 * nodes[0] - far
+        at = np.concatenate(([least], -nodes[::-1] if self.odd else [], nodes, [far]))
+        at = np.unique(at)
+        return np.asarray(np.interp(values, self.at(at) + FLAT_SLOPE * at, at))
+
     @property
     def slopes(self) -> list[float]:
         """The slope of each segment."""
@@ -85,6 +98,11 @@ class FrictionCurve(Curve):
     force: list[float] = quantity("N", [])
     force_push: list[float] = quantity("N", [])
 
+    @property
+    def forward(self) -> list[float]:
+        """The force at each rate of motion forward, N."""
+        return self.force_push or self.force
+
 
 class LoadCurve(Curve):
     """Dry friction by the size of the force carried, added to the friction."""
@@ -106,7 +124,7 @@ class BendCurve(Curve):
 
 
 class DeflectionReading(Curve):
-    """The reading of δc by the host over δc, before the scales of `Sensing`."""
+    """A transducer's reading over δc, before the scales of `Sensing`, or over δ at the grip."""
 
     MAP = True
     LISTS = ("deflection", "reading")
@@ -198,6 +216,20 @@ def _check_values(curve: Curve, file: object, path: str, d: str) -> None:
         raise InputError(file, values, problem)
     if isinstance(curve, (FrictionCurve, LoadCurve)) and nodes[0] != 0.0:
         raise InputError(file, of, f"begins at {nodes[0]:g}; it should begin at 0")
+    _check_rubs(curve, file, path, d)
     if curve.MAP and min(curve.slopes) < 0.0:
         low = nodes[curve.slopes.index(min(curve.slopes))]
         raise InputError(file, values, f"falls beyond {low:g}; it may not fall from value to value")
+
+
+def _check_rubs(curve: Curve, file: object, path: str, d: str) -> None:
+    """Refuse added dry friction below zero; at rates above 0 a curve is damping, and may fall."""
+    if not isinstance(curve, (FrictionCurve, LoadCurve)):
+        return
+    for key, field in list(file_keys(type(curve), d).items())[1:]:
+        given = getattr(curve, field)
+        rubs = given if isinstance(curve, LoadCurve) else given[:1]
+        for node, value in zip(curve.nodes, rubs, strict=False):
+            if value < 0.0:
+                problem = f"is {value:g} at {node:g}; dry friction is not below 0, give at least 0"
+                raise InputError(file, f"{path}.{key}", problem)

@@ -31,7 +31,7 @@ from coupled.rig.modification import (
 )
 from coupled.rig.reach import free, stop_again
 from coupled.rig.schedule import gradients, read_pressure
-from coupled.rig.sensing import converted, read_computed, read_force
+from coupled.rig.sensing import converted, read_computed, read_force, read_grip
 from coupled.rig.services import begin_services, commanded_deflection, note_services
 from coupled.rig.surface import command_surface
 
@@ -126,7 +126,8 @@ def host_frame(
     out[0] = force_read
     out[1] = computed_read
     out[2] += p.sensing.deflection_zero
-    out[2] += transducer(p.linkage, deflection(p.linkage, s.linkage, force))
+    at_grip = transducer(p.linkage, deflection(p.linkage, s.linkage, force))
+    out[2] += read_grip(p.sensing, at_grip)
     out[3] = estimated
     out[4] = first
     out[5] += product

@@ -101,7 +101,7 @@ def _at_rest(given: Given) -> tuple[float, float]:
     curve = given.control.loader.friction_curve
     if not curve.nodes:
         return 0.0, 0.0
-    return curve.force[0], (curve.force_push or curve.force)[0]
+    return curve.force[0], curve.forward[0]
 
 
 FRICTION = Declaration(

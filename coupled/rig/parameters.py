@@ -99,6 +99,12 @@ class Loader(Section):
     load_curve: LoadCurve = LoadCurve()
     bend_curve: BendCurve = BendCurve()
 
+    @property
+    def least_bend(self) -> float:
+        """The least bend by the force, d/N, without its curve; 0 if the bend has a limit."""
+        push = self.bend if self.bend_push is None else self.bend_push
+        return 0.0 if self.bend_limit > 0.0 else min(self.bend, push)
+
 
 class Schedule(Section):
     """Force over deflection and dynamic pressure, and faults of its use.
@@ -199,6 +205,7 @@ class Sensing(Section):
     gradient_skew: float = quantity("s", 0.0, ge=0)
     deflection_curve: DeflectionReading = DeflectionReading()
     force_curve: ForceReading = ForceReading()
+    grip_curve: DeflectionReading = DeflectionReading()
 
     @property
     def read_scale(self) -> float:

@@ -42,7 +42,7 @@ def damping_table(curve: FrictionCurve) -> Floats:
     if not curve.nodes:
         return _ABSENT
     nodes, ahead = np.array(curve.nodes), np.array(curve.values)
-    back = np.array(curve.force_push or curve.values)
+    back = np.array(curve.forward)
     return _table(*_to_both_sides(nodes, ahead - ahead[0], back - back[0]))
 
 

@@ -285,8 +285,7 @@ def _check_control(rig: Rig, name: str, control: Control, file: object) -> None:
 def _check_loader_curves(rig: Rig, control: Control, file: object, path: str, d: str) -> None:
     """Refuse curves by which the grip moves against the force, or which no step can follow."""
     loader, rate_Hz = control.loader, rig.frame_rate * rig.substeps
-    sides = [loader.bend, loader.bend if loader.bend_push is None else loader.bend_push]
-    least = 0.0 if loader.bend_limit > 0.0 else min(sides)
+    least = loader.least_bend
     if (slope := min(loader.bend_curve.slopes, default=0.0)) < -least:
         problem = f"falls by {-slope:.3g} {d}/N, and K is {least:.3g} {d}/N: the grip may not move"
         raise InputError(file, f"{path}.bend_curve.bend_{d}", f"{problem} against the force")

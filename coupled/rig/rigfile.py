@@ -21,7 +21,12 @@ def read_rig(path: Path, changes: Mapping[str, Any] | None = None) -> Rig:
     for key, value in (changes or {}).items():
         if not change(table, key, value):
             raise InputError(path, key, "names a key within a value, not a table")
-    return of_file(rig_from_table(table, path), (path, text))
+    rig = rig_from_table(table, path)
+    for name, control in rig.controls.items():
+        if control.loader.gravity_angle != 0.0 and control.loader.gravity == 0.0:
+            problem = "has no effect without gravity_N; give the weight, or leave the angle out"
+            raise InputError(path, f"controls.{name}.loader.gravity_angle_rad", problem)
+    return of_file(rig, (path, text))
 
 
 def _placed(flight: Any, file: object) -> Any:

@@ -16,7 +16,7 @@ S₁·(1 + rate·t_k)·δc over the assumed S₁. Mains hum may be added, hum·s
 host reads it, too, and a converter sampled below 2·f aliases it. Late time stamps are an effect of
 the recorder (`recorder`).
 
-Gauge and transducer of δc may be nonlinear: a curve gives the reading over the true value, to which
+Gauge and transducers may be nonlinear: a curve gives the reading over the true value, to which
 scale, offset, hum and noise are applied (`curves`).
 """
 
@@ -61,6 +61,8 @@ class SensingParameters(Protocol):
     computed_curve: NDArray[np.float64]  # reading less true, d
     force_nodes: int  # of the curve of F as read
     force_curve: NDArray[np.float64]  # reading less true, N
+    grip_nodes: int  # of the curve of the grip's transducer
+    grip_curve: NDArray[np.float64]  # reading less true, d
 
 
 class SensingState(Protocol):
@@ -89,7 +91,7 @@ def _step(of: str) -> Callable[[Given], float]:
 
 
 SENSING = Declaration(
-    layout(SensingParameters, computed_curve=SHAPE, force_curve=SHAPE),
+    layout(SensingParameters, computed_curve=SHAPE, force_curve=SHAPE, grip_curve=SHAPE),
     section="control.sensing",
     derived={
         "read_scale": lambda g: g.control.sensing.read_scale,
@@ -106,6 +108,8 @@ SENSING = Declaration(
         "computed_curve": lambda g: table_of(g.control.sensing.deflection_curve),
         "force_nodes": lambda g: count_of(g.control.sensing.force_curve),
         "force_curve": lambda g: table_of(g.control.sensing.force_curve),
+        "grip_nodes": lambda g: count_of(g.control.sensing.grip_curve),
+        "grip_curve": lambda g: table_of(g.control.sensing.grip_curve),
     },
     state=layout(SensingState),
 )
@@ -176,3 +180,11 @@ def read_force(p: SensingParameters, force: float, noise: float) -> float:
     """Return F as the host reads it, N."""
     read = scaled_force(p, force) + (noise + p.force_zero)
     return converted(read, p.force_step, p.force_range)
+
+
+@stage
+def read_grip(p: SensingParameters, shown: float) -> float:
+    """Return the grip's transducer's reading by its curve, d, without zero offset and noise."""
+    if p.grip_nodes > 0:
+        shown += along(p.grip_curve, p.grip_nodes, shown)
+    return shown

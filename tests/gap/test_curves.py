@@ -11,9 +11,14 @@ import pytest
 from coupled.blind.twin.twin import Twin
 from coupled.gap.chain import Part
 from coupled.gap.diagnose import findings
+from coupled.gap.findings.curvefit import Basis, choose, closed_form
+from coupled.gap.findings.curvelaws import LAWS
+from coupled.gap.findings.curves import response_to_force
 from coupled.gap.findings.diagnosis import PartDiagnosis
+from coupled.gap.noise.smooth import smoothed
 from coupled.gap.prepare import prepare
 from coupled.gap.search.beam import search_sets
+from coupled.gap.signals.output import Output
 from coupled.gap.signals.reading import Sensed
 from coupled.plots.curves import draw_curves
 from coupled.plots.gapview import View
@@ -31,6 +36,16 @@ ENTRY, WRONG = 2, 1.1  # an entry of the schedule, and the factor by which it is
 
 def by_the_square(twin: Twin, time_s: float, pressure_Pa: float) -> None:
     twin.set(quadratic_damping=QUADRATIC)
+
+
+def reads_by_the_square(twin: Twin, time_s: float, pressure_Pa: float) -> None:
+    """Let the transducer at the grip read δ + 0.6·δ²."""
+    twin.set(read_square=0.6)
+
+
+def bends_unlike(twin: Twin, time_s: float, pressure_Pa: float) -> None:
+    """Bend more in a pull than in a push."""
+    twin.set(bend_uneven=2e-5)
 
 
 def wrong_entry(twin: Twin, time_s: float, pressure_Pa: float) -> None:
@@ -73,6 +88,25 @@ def test_damping_by_the_square_of_the_speed_is_a_curve_over_the_rate() -> None:
     assert whole == pytest.approx(QUADRATIC * rate**2, abs=between, rel=0.1)
     assert np.all(np.array(curve.low) <= curve.values)
     assert np.all(np.array(curve.high) >= curve.values)
+
+
+@pytest.mark.parametrize(
+    ("fault", "key", "like"),
+    [
+        (reads_by_the_square, "sensing.grip_curve", "c·δ²"),
+        (bends_unlike, "loader.bend_curve", "c·|F|"),
+    ],
+)
+def test_a_law_of_the_linkage_is_a_curve_over_its_own_signal(
+    fault: Fault, key: str, like: str
+) -> None:
+    rig = RIG.changed({"controls.column.loader.bend_m_per_N": 9e-5})
+    found = curves_of(recorded(fault, rig=rig), rig)
+    assert found is not None
+    (curve,) = found.found
+    assert (curve.key, curve.stage) == (f"controls.column.{key}", "linkage")
+    assert curve.like == like
+    assert curve.closed > 0.9
 
 
 @pytest.fixture(scope="module")
@@ -133,6 +167,14 @@ def test_a_reading_is_inverted_along_its_curve(first: float) -> None:
     true = np.linspace(-0.04, 0.04, 41)
     assert not np.allclose(sensed.along_curve(true), true)
     assert sensed.before_curve(sensed.along_curve(true)) == pytest.approx(true, abs=1e-7)
+    table = {"deflection_m": nodes, "reading_m": reading}
+    changes = {"grip_curve": table, "deflection_zero_m": 0.01}
+    at_grip = Sensed(
+        RIG.changed({f"controls.column.sensing.{key}": value for key, value in changes.items()}),
+        "column",
+    )
+    assert at_grip.at_grip(true) == pytest.approx(sensed.along_curve(true) + 0.01)
+    assert at_grip.from_grip(at_grip.at_grip(true)) == pytest.approx(true, abs=1e-7)
 
 
 def test_curves_are_written_to_an_improved_rig_only(tmp_path: Path) -> None:
@@ -166,3 +208,32 @@ def test_the_rig_with_curves_is_written_and_explains_the_record(tmp_path: Path) 
     assert not read_rig(tmp_path / "plain.toml").controls["column"].schedule.gradient_curve.nodes
     again = coupled(tmp_path, "diagnose", "r.csv", "--rig", "./new.toml")
     assert "No gap" in again.stdout
+
+
+def test_a_force_in_proportion_to_the_deflection_is_answered_as_a_spring() -> None:
+    record = recorded(healthy)
+    case = prepare(RIG, {"record": record}, Part("column")).case
+    (output,) = (one for one in case.outputs if one.stage == "loader")
+    place = smoothed(record["column_computed_m"])
+    answer = response_to_force(RIG, "column", record, output, 20.0 * place)
+    key = "controls.column.loader.force_curve"
+    spring = {"deflection_m": [-1.0, 0.0, 1.0], "force_N": [-20.0, 0.0, 20.0]}
+    sprung = output.residual(RIG) - output.residual(RIG.changed({key: spring}))
+    assert np.std(sprung) > 2.0
+    assert np.std(answer - sprung) < 0.06 * np.std(sprung)  # a frame late, it is 0.1
+
+
+@pytest.mark.parametrize("two", [True, False])
+def test_a_closed_form_of_two_signals_is_named_if_it_fits_best(two: bool) -> None:
+    rng = np.random.default_rng(3)
+    place, rate = np.sin(np.arange(2400) / 50.0), rng.standard_normal(2400)
+    law = next(one for one in LAWS if one.key == "loader.force_curve")
+    places = np.linspace(-1.0, 1.0, 21)
+    hats = np.array([np.interp(place, places, unit) for unit in np.eye(21)]).T
+    product = place * np.abs(rate)
+    wanted = 20.0 * (product if two else place**3) + rng.standard_normal(2400)
+    output = Output("loader", "column_computed_m", wanted, lambda rig: 0.0 * wanted, 1.0, 100.0)
+    basis = Basis(law, places, [output], [hats], [wanted], np.ones(1))
+    pick = choose(basis, basis.sums("all"), ())
+    other = {"c·δ·|v|": [product]}
+    assert closed_form(basis, pick, (), other) == ("c·δ·|v|" if two else "c·δ³")

@@ -146,6 +146,11 @@ EQUAL: dict[str, tuple[dict[str, Any], dict[str, Any], dict[str, Any]]] = {
         {f"{SENSING}.deflection_curve": line("deflection_m", "reading_m", 1.07, 0.1)},
         {"multiplier": "digital"},
     ),
+    "the zero of the grip's transducer": (
+        {f"{SENSING}.deflection_zero_m": 2e-3},
+        {f"{SENSING}.grip_curve": {"deflection_m": [-0.1, 0.2], "reading_m": [-0.098, 0.202]}},
+        {},
+    ),
     "the gauge's scale and zero": (
         {f"{SENSING}.force_scale": 1.07, f"{SENSING}.force_zero_N": 2.0},
         {f"{SENSING}.force_curve": {"force_N": [-60.0, 50.0], "reading_N": [-62.2, 55.5]}},
@@ -177,6 +182,7 @@ KINDS: dict[str, tuple[str, str, bool]] = {  # of each curve its lists, and whet
     f"{SCHEDULE}.gradient_curve": ("dynamic_pressure_Pa", "gradient_N_per_m", False),
     f"{SENSING}.deflection_curve": ("deflection_m", "reading_m", True),
     f"{SENSING}.force_curve": ("force_N", "reading_N", True),
+    f"{SENSING}.grip_curve": ("deflection_m", "reading_m", True),
     "controls.column.rigging.command_curve": ("deflection_norm", "command_norm", True),
 }
 RUBBING = {"friction_N": 2.0, "breakout_N": 3.0}
@@ -281,17 +287,6 @@ def test_a_force_through_a_damping_of_several_segments_settles_at_its_speed() ->
         assert 0.002 < abs(speed) < 0.05
         level = float(np.interp(abs(speed), curve.rate, forces))
         assert 75.0 * abs(speed) + level == pytest.approx(abs(force), rel=1e-9)
-
-
-def test_friction_is_not_below_zero_by_a_curve() -> None:
-    rubs = {"friction_N": 2.0}
-    least, less = (
-        {**rubs, "friction_curve": {"rate_m_per_s": [0.0, 1.0], "force_N": [level, level]}}
-        for level in (-2.0, -5.0)
-    )
-    assert flown(bench(less)).tobytes() == flown(bench(least)).tobytes()
-    one = {**rubs, "friction_curve": {"rate_m_per_s": [0.0, 1.0], "force_N": [-1.0, -1.0]}}
-    assert both({"friction_N": 1.0}, one, rubs) < LIMIT
 
 
 def test_an_imposed_motion_is_answered_with_damping_and_spring_of_curves() -> None:
@@ -447,6 +442,18 @@ def test_an_export_to_jsbsim_refuses_a_curve_by_its_name() -> None:
         ("friction_curve", line(*DAMPING, -1e6, 0.1), ".force_N", "at most"),
         ("friction_curve", line(*DAMPING, 1.0, 0.1, -0.1), ".rate_m_per_s", "begin at 0"),
         ("load_curve", line("load_N", "friction_N", 0.95, 9.0), ".friction_N", "0.9 at most"),
+        (
+            "load_curve",
+            {"load_N": [0.0, 9.0, 20.0], "friction_N": [0.0, -1.0, 2.0]},
+            ".friction_N",
+            "is -1 at 9; dry friction is not below 0",
+        ),
+        (
+            "friction_curve",
+            {"rate_m_per_s": [0.0, 0.1], "force_N": [1.0, 0.0], "force_push_N": [-2.0, 1.0]},
+            ".force_push_N",
+            "is -2 at 0; dry friction is not below 0",
+        ),
         ("bend_curve", line("force_N", "bend_m", -1e-4, 9.0), ".bend_m", "against the force"),
         (
             "bend_curve",

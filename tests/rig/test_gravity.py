@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,7 @@ from coupled.errors import InputError
 from coupled.rig.imposed import answer_to
 from coupled.rig.nodes import on_nodes
 from coupled.rig.replay import drive_loader
+from coupled.rig.rigfile import read_rig
 from coupled.rig.statics import static_line
 from tests.support.pendulum import DAMPING, WEIGHT_N, ANGLE_rad, pendulum_rig, swing
 from tests.support.rigs import bench
@@ -43,6 +46,15 @@ def test_at_rest_and_under_imposed_motion_the_force_is_that_of_the_weight() -> N
 def test_a_control_that_moves_along_a_line_has_none() -> None:
     with pytest.raises(InputError, match=r"gravity_N: acts on an axis that turns"):
         bench({"gravity_N": 3.0})
+
+
+def test_an_angle_without_a_weight_is_refused_in_a_file(tmp_path: Path) -> None:
+    text = pendulum_rig().to_toml()
+    assert text.count("\ngravity_N = ") == 1
+    lines = [line for line in text.splitlines() if not line.startswith("gravity_N")]
+    (tmp_path / "rig.toml").write_text("\n".join(lines), encoding="utf-8")
+    with pytest.raises(InputError, match=r"angle_rad: has no effect without gravity_N"):
+        read_rig(tmp_path / "rig.toml")
 
 
 @pytest.mark.parametrize("frame_Hz", [25.0, 10_000.0])

@@ -61,6 +61,7 @@ RIG = bench(
         },
         f"{SENSING}.deflection_curve": {"deflection_m": [0.0, 0.1], "reading_m": [0.0, 0.11]},
         f"{SENSING}.force_curve": {"force_N": [0.0, 60.0], "reading_N": [0.0, 61.0]},
+        f"{SENSING}.grip_curve": {"deflection_m": [0.0, 0.1], "reading_m": [0.0, 0.12]},
         "controls.column.rigging.command_curve": {
             "deflection_norm": [0.0, 1.0],
             "command_norm": [0.0, 0.9],

@@ -14,7 +14,7 @@ from coupled.rig.control import CONTROL
 from coupled.rig.frame import CHANNELS_PER_CONTROL, host_frames, serve_frame, start_controls
 from coupled.rig.linkage import deflection, transducer
 from coupled.rig.mechanism import run_frame
-from coupled.rig.sensing import read_computed
+from coupled.rig.sensing import read_computed, read_grip
 
 _MOTION = 5  # channels of the motion up to the angle of attack
 ROW = 1 + CHANNELS_PER_CONTROL + _MOTION + 2  # a record's row, and δc and δ at the frame's end
@@ -50,7 +50,7 @@ def frame(
     sampled = s.sensing.computed if p.sensing.skewed else s.loader.computed
     out[ROW - 2] = read_computed(p.sensing, sampled, s.modification.frames, 0.0)
     at = deflection(p.linkage, s.linkage, s.hand.force)
-    out[ROW - 1] = transducer(p.linkage, at) + p.sensing.deflection_zero
+    out[ROW - 1] = read_grip(p.sensing, transducer(p.linkage, at)) + p.sensing.deflection_zero
     return float(command)
 
 

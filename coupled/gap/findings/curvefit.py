@@ -10,7 +10,7 @@ slope at node i, h_i the mean width beside it. The log evidence of a linear mode
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -199,19 +199,30 @@ def with_nodes(basis: Basis, sums: Sums, at: Sequence[int]) -> Pick:
     return Pick(tuple(at), max(each, key=lambda one: one.log))
 
 
-def choose(basis: Basis, sums: Sums, entries: Sequence[float]) -> tuple[Pick, Pick]:
-    """Return the curve with the nodes of the largest evidence, and the straight line.
+def choose(basis: Basis, sums: Sums, entries: Sequence[float]) -> Pick:
+    """Return the curve with the nodes of the largest evidence.
 
     The search begins at the ends, and again at the entries of the schedule.
     """
     ends = {0, len(basis.places) - 1, *np.flatnonzero(basis.places == 0.0).tolist()}
-    line = with_nodes(basis, sums, sorted(ends))
     own = ends | {*np.flatnonzero(np.isin(basis.places, entries)).tolist()}
-    starts = [line]
-    if len(ends) < len(own) < CURVE_NODES:
-        starts.append(with_nodes(basis, sums, sorted(own)))
-    grown = [_grown(basis, sums, start, ends) for start in starts]
-    return max(grown, key=lambda one: one.known.log), line
+    starts = [ends, own] if len(ends) < len(own) < CURVE_NODES else [ends]
+    grown = [_grown(basis, sums, with_nodes(basis, sums, sorted(at)), ends) for at in starts]
+    return max(grown, key=lambda one: one.known.log)
+
+
+def straight(basis: Basis, sums: Sums) -> float:
+    """Return the largest log evidence of a straight line, which the library's effects have."""
+    return max(_log_of(sums.of(line)) for line in _lines(basis))
+
+
+def _lines(basis: Basis) -> list[Floats]:
+    """Return the straight lines of a law at its places: level and slope, or one of them."""
+    slope = basis.places[:, None]
+    if basis.law.anchored:
+        return [slope]
+    level = np.ones_like(slope)
+    return [slope, level, np.column_stack((slope, level))]
 
 
 def _grown(basis: Basis, sums: Sums, start: Pick, ends: set[int]) -> Pick:
@@ -239,17 +250,26 @@ def _grown(basis: Basis, sums: Sums, start: Pick, ends: set[int]) -> Pick:
 Form = tuple[str, Floats]
 
 
-def closed_form(basis: Basis, curve: Pick, entries: Sequence[float]) -> str:
+def closed_form(
+    basis: Basis, curve: Pick, entries: Sequence[float], others: Mapping[str, Sequence[Floats]]
+) -> str:
     """Return the closed form with the largest evidence, if that is as large as the curve's.
 
-    Beside it, a straight line is free: its slope and its level are effects of the library.
+    Beside it, a straight line is free: its slope and its level are effects of the library. `others`
+    are forms of more than the law's signal, by name, as the responses of each output, in floors.
     """
-    sums, places = basis.sums("all"), basis.places
-    lines = [np.empty((len(places), 0)), places[:, None]]
-    if not basis.law.anchored:
-        lines += [np.ones((len(places), 1)), np.column_stack((places, np.ones(len(places))))]
+    columns = [
+        np.column_stack((own, *(each[k] for each in others.values())))
+        for k, own in enumerate(basis.columns)
+    ]
+    sums = replace(basis, columns=columns).sums("all")
+    unit = np.eye(len(basis.places) + len(others))
+    on_places = unit[:, : len(basis.places)]
+    forms = [(name, on_places @ form) for name, form in _forms(basis.law, basis.places, entries)]
+    forms += zip(others, unit[len(basis.places) :, :, None], strict=True)
+    lines = [np.empty((len(unit), 0)), *(on_places @ line for line in _lines(basis))]
     best, name = curve.known.log - RIVAL_GAIN, ""
-    for text, form in _forms(basis.law, places, entries):
+    for text, form in forms:
         for line in lines:
             log = _log_of(sums.of(np.column_stack((form, line))))
             if log > best:
@@ -289,7 +309,8 @@ def _forms(law: Law, x: Floats, entries: Sequence[float]) -> Iterator[Form]:
     if not law.by_size:
         yield f"c·{s}²", x**2
         yield f"c·|{s}|", size
-    for at in size[size > 0.0]:
-        yield f"c·sgn({s}) beyond |{s}| = {at:.3g}", np.sign(x) * (size >= at)
-        zone = "dead zone" if law.stage in ("sensing", "surface") else "saturation"
+    zone = "dead zone" if law.is_map else "saturation"
+    for k, at in enumerate(np.unique(size[size > 0.0])):
         yield f"{zone} at |{s}| = {at:.3g}", np.clip(x, -at, at)
+        if k > 0:  # between 0 and the first place the sign is a line, as the zone
+            yield f"c·sgn({s}) beyond |{s}| = {at:.3g}", np.sign(x) * (size >= at)

@@ -12,7 +12,7 @@ from coupled.display import split_unit
 from coupled.errors import InputError
 from coupled.gap.thresholds import CURVE_PLACES
 from coupled.record.channels import ControlName, unit_of
-from coupled.rig.curves import BendCurve, GradientCurve
+from coupled.rig.curves import BendCurve, GradientCurve, LoadCurve
 from coupled.rig.curves import Curve as RigCurve
 from coupled.rig.rig import Rig
 from coupled.schema import SMALLEST, file_keys
@@ -26,7 +26,7 @@ class Law:
 
     `signal` is a name in `where.signals`, `symbol` that of closed forms. `scale` is a signal of the
     size of its values. `by_size`: of the signal's size only. `anchored`: it vanishes at 0, where a
-    named effect acts.
+    named effect acts. `is_map`: its value replaces the signal.
     """
 
     key: str
@@ -36,6 +36,7 @@ class Law:
     scale: str
     by_size: bool = False
     anchored: bool = False
+    is_map: bool = False
 
 
 LAWS = (
@@ -51,10 +52,11 @@ LAWS = (
     ),
     Law("loader.load_curve", "loader", "force_N", "F", "force_N", by_size=True, anchored=True),
     Law("loader.bend_curve", "linkage", "force_N", "F", "computed_{d}", anchored=True),
-    Law("sensing.deflection_curve", "sensing", "computed_{d}", "δ", "computed_{d}"),
-    Law("sensing.force_curve", "sensing", "force_N", "F", "force_N"),
+    Law("sensing.grip_curve", "linkage", "deflection_{d}", "δ", "deflection_{d}", is_map=True),
+    Law("sensing.deflection_curve", "sensing", "computed_{d}", "δ", "computed_{d}", is_map=True),
+    Law("sensing.force_curve", "sensing", "force_N", "F", "force_N", is_map=True),
     Law("schedule.gradient_curve", "schedule", "dynamic_pressure_Pa", "q̄", "gradient_N_per_{d}"),
-    Law("rigging.command_curve", "surface", "estimate_{d}", "δ̂", "estimate_{d}"),
+    Law("rigging.command_curve", "surface", "estimate_{d}", "δ̂", "estimate_{d}", is_map=True),
 )
 
 
@@ -82,7 +84,8 @@ def with_curve(
     """Return the rig with a curve; None if no rig can have it.
 
     The values of a map are added to the signal. Neither a map nor a bend may fall: where one
-    would, it is flat. A curve of the schedule is constant beyond its nodes.
+    would, it is flat. Friction by load is not below 0. A curve of the schedule is constant beyond
+    its nodes.
     """
     kind = type(filed_curve(rig, control, law))
     of, value, *_ = file_keys(kind, unit_of(control))
@@ -92,9 +95,11 @@ def with_curve(
         nodes = np.concatenate(([nodes[0] - beyond], nodes, [nodes[-1] + beyond]))
         given = np.pad(values, 1, "edge")
     if kind.MAP or kind is BendCurve:
-        line = nodes * (1.0 if kind.MAP else _least_bend(rig, control))
+        line = nodes * (1.0 if kind.MAP else rig.controls[control].loader.least_bend)
         raised = np.maximum.accumulate(values + line)
         given = raised if kind.MAP else raised - line - np.interp(0.0, nodes, raised - line)
+    if kind is LoadCurve:
+        given = np.maximum(values, 0.0)
     lists = {
         name: np.where(np.abs(each) < SMALLEST, 0.0, each).tolist()
         for name, each in ((of, nodes), (value, given))
@@ -103,13 +108,6 @@ def with_curve(
         return rig.changed({f"controls.{control}.{law.key}": lists})
     except InputError:
         return None
-
-
-def _least_bend(rig: Rig, control: ControlName) -> float:
-    """Return the least bend by the force that a rig has without a curve, d/N."""
-    loader = rig.controls[control].loader
-    push = loader.bend if loader.bend_push is None else loader.bend_push
-    return 0.0 if loader.bend_limit > 0.0 else min(loader.bend, push)
 
 
 def rising(places: Floats) -> Floats:

@@ -27,7 +27,15 @@ from coupled.gap.chain import BY_NAME as STAGE_OF
 from coupled.gap.chain import stage_of
 from coupled.gap.findings.budget import ChannelShrink, channel_shrink
 from coupled.gap.findings.credibility import Acts, regimes
-from coupled.gap.findings.curvefit import Basis, Pick, Values, choose, closed_form, with_nodes
+from coupled.gap.findings.curvefit import (
+    Basis,
+    Pick,
+    Values,
+    choose,
+    closed_form,
+    straight,
+    with_nodes,
+)
 from coupled.gap.findings.curvelaws import (
     LAWS,
     Law,
@@ -40,6 +48,7 @@ from coupled.gap.findings.curvelaws import (
 )
 from coupled.gap.findings.result import EffectResult
 from coupled.gap.findings.where import signals
+from coupled.gap.noise.smooth import smoothed
 from coupled.gap.search.case import Case
 from coupled.gap.search.evidence import Evidence, evidence, fewest_unexplained, misfit
 from coupled.gap.search.found import Choice, Fit
@@ -51,6 +60,9 @@ from coupled.gap.signals.output import (
     stage_gaps,
     stage_limits,
 )
+from coupled.gap.signals.reading import LOAD
+from coupled.gap.stages.stages import Reader
+from coupled.gap.stages.surfaces import surface_points
 from coupled.gap.thresholds import (
     CERTAIN,
     CURVE_CLOSES,
@@ -62,7 +74,7 @@ from coupled.gap.thresholds import (
     RIVAL_GAIN,
 )
 from coupled.parallel import in_threads
-from coupled.record.channels import unit_of
+from coupled.record.channels import ControlName, unit_of
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
 from coupled.rig.surface import share_of_travel
@@ -177,7 +189,6 @@ class _Made:
     rig: Rig
     basis: Basis
     pick: Pick
-    line: Pick
     likelihood: float
 
 
@@ -260,7 +271,10 @@ class _Fitter:
             record, left = self.records[output.record], output.residual(self.rig)
             stage = "loader" if law.stage == "sensing" else law.stage
             shown = signals(output, left, record, control, stage)
-            each = shown.get(named(law.signal, control))
+            name = named(law.signal, control)
+            if name not in shown and (own := f"{control}_{name}") in record:
+                shown[name] = smoothed(record[own])
+            each = shown.get(name)
             if each is None or np.ptp(each) <= 0.0:
                 return None
             if law.stage == "surface":
@@ -294,12 +308,12 @@ class _Fitter:
         basis = self._basis(law, places, outputs, about)
         if basis is None:
             return None
-        pick, line = choose(basis, basis.sums("fitted"), self._entries(law))
+        pick = choose(basis, basis.sums("fitted"), self._entries(law))
         values = pick.values(basis)
         rig = self._with(law, values)
         if rig is None:
             return None
-        return _Made(law, values, rig, basis, pick, line, self._likelihood(basis, rig))
+        return _Made(law, values, rig, basis, pick, self._likelihood(basis, rig))
 
     def _basis(
         self, law: Law, places: Floats, outputs: Sequence[Output], about: Values | None
@@ -383,7 +397,8 @@ class _Fitter:
 
     def _bent(self, made: _Made) -> bool:
         """Tell whether a curve has more evidence than a straight line."""
-        return made.pick.known.log > made.line.known.log + RIVAL_GAIN
+        line = straight(made.basis, made.basis.sums("fitted"))
+        return made.pick.known.log > line + RIVAL_GAIN
 
     def _stated(self, made: _Made, rig: Rig, pick: Pick) -> Curve | None:
         """Return a curve with its tests; None if it fails one."""
@@ -410,9 +425,24 @@ class _Fitter:
             closed=held.closed,
             closed_low=held.low,
             closed_high=held.high,
-            like=closed_form(made.basis, pick, self._entries(law)),
+            like=closed_form(made.basis, pick, self._entries(law), self._of_two_signals(made)),
             lists=lists,
         )
+
+    def _of_two_signals(self, made: _Made) -> dict[str, list[Floats]]:
+        """Return the responses to a force in proportion to δ·|v|, by name; none of other stages."""
+        outputs, control = made.basis.outputs, self.case.control
+        if made.law.stage != "loader":
+            return {}
+        found = []
+        for output in outputs:
+            record = self.records[output.record]
+            known = signals(output, output.residual(self.rig), record, control, "loader")
+            d = unit_of(control)
+            force = known[f"computed_{d}"] * np.abs(known[f"computed_rate_{d}_per_s"])
+            size = self._step(made.law, outputs) / float(np.sqrt(np.mean(force**2)))
+            found.append(response_to_force(self.rig, control, record, output, size * force))
+        return {"c·δ·|v|": found}
 
     def _drift(self, rig: Rig, outputs: Sequence[Output]) -> float:
         """Return the largest significant difference of a curve's size between halves."""
@@ -425,3 +455,23 @@ class _Fitter:
         halves = regimes(self.case, acts)
         chance = DRIFT_CHANCE / max(len(halves), 1)
         return max((one.apart(chance) for one in halves), default=0.0)
+
+
+def response_to_force(
+    rig: Rig, control: ControlName, record: Record, output: Output, force: Floats
+) -> Floats:
+    """Return an output's response to a force against δc, N at the frames, in floors.
+
+    The force is that of a bob weight of 1 N/g, whose load factor is the force; those of rig and
+    record are left out of the difference.
+    """
+    if output.stage != "loader":
+        return np.zeros(len(output.measured))
+    kept = [name for name in record.channels if name != LOAD]
+    data = np.column_stack((*(record[name] for name in kept), 1.0 + force))
+    loaded = replace(record, channels=(*kept, LOAD), data=data)
+    reader = Reader(rig, loaded, control, surface_points, output.record)
+    made = next(one for one in reader.outputs() if one.channel == output.channel)
+    key = f"controls.{control}.loader.bob_weight_N_per_g"
+    moved = made.predict(rig.changed({key: 1.0})) - made.predict(rig.changed({key: 0.0}))
+    return np.asarray(moved / output.floor)

@@ -23,11 +23,9 @@ from coupled.gap.signals.floors import Drive, floor_from, noise_in
 from coupled.gap.signals.live import Assumed, Live, Mask, live_of
 from coupled.gap.signals.missed import Missed, missed_in
 from coupled.gap.signals.output import Floats
-from coupled.gap.thresholds import FAR, ROUNDING_SPAN
 from coupled.record.channels import SURFACES, ControlName, channel
 from coupled.record.record import Record
 from coupled.rig.crossing import leaking
-from coupled.rig.curves import Curve
 from coupled.rig.nodes import on_nodes
 from coupled.rig.parameters import Sensing
 from coupled.rig.recorder import stamped
@@ -47,10 +45,14 @@ class Sensed:
     def _of(self) -> Sensing:
         return self.rig.controls[self.control].sensing
 
-    @property
-    def zero(self) -> float:
-        """The reading of the transducer at the grip at neutral, d."""
-        return self._of.deflection_zero
+    def at_grip(self, shown: Floats) -> Floats:
+        """Return the reading of the grip's transducer, d, from its deflection on the arc."""
+        curve = self._of.grip_curve
+        return self._of.deflection_zero + (curve.at(shown) if curve.nodes else shown)
+
+    def from_grip(self, read: Floats) -> Floats:
+        """Return the deflection at the grip, d, from the reading of its transducer."""
+        return self._of.grip_curve.inverse(read - self._of.deflection_zero)
 
     def hum(self, read: Floats) -> Floats | float:
         """Return the mains hum at each frame in δc as read, d."""
@@ -113,26 +115,13 @@ class Sensed:
 
     def before_curve(self, read: Floats) -> Floats:
         """Return δc whose value by the transducer's curve is given, d."""
-        return _inverse(self._of.deflection_curve, read)
+        return self._of.deflection_curve.inverse(read)
 
     def _unread(self, read: Floats) -> Floats:
         of = self._of
         if of.force_scale != 1.0 or of.force_zero != 0.0:
             read = (read - of.force_zero) / of.force_scale
-        return _inverse(of.force_curve, read)
-
-
-def _inverse(curve: Curve, values: Floats) -> Floats:
-    """Return the signals at which a map has given values; where it is flat, one of them."""
-    if not curve.nodes:
-        return values
-    nodes = np.array(curve.nodes)
-    far = nodes[-1] + FAR * max(float(nodes[-1] - nodes[0]), float(np.ptp(values)))
-    least = -far if curve.odd else 2.0 * nodes[0] - far
-    at = np.concatenate(([least], -nodes[::-1] if curve.odd else [], nodes, [far]))
-    at = np.unique(at)
-    found = curve.at(at)
-    return np.asarray(np.interp(values, found + ROUNDING_SPAN * at, at))
+        return of.force_curve.inverse(read)
 
 
 PRESSURE, LOAD = "dynamic_pressure_Pa", "load_factor"

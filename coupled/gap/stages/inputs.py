@@ -142,7 +142,7 @@ class Imposed:
         def at_loader(rig: Rig) -> Floats:
             read_as = reading.sensed(rig)
             if reading.imposed == "deflection":
-                grip, bending = moved - read_as.zero, read_as.force(pulled)
+                grip, bending = read_as.from_grip(moved), read_as.force(pulled)
                 return behind_linkage(rig, reading.control, grip, bending, self._others)
             nodes = imposed.of(rig)
             return read_as.before_curve(np.asarray(nodes / read_as.scale_on_nodes(len(nodes))))
@@ -218,7 +218,7 @@ class Series:
             host = self._hosted._replace(missed=reading.missed.under(rig, reading.control))
             driven_by = (pull, self._gradient, bending, self._load(rig), self._second)
             read = drive_series(rig, reading.control, *driven_by, host, self._others)
-            return sensed.zero + read
+            return sensed.at_grip(read)
 
         def taken_up(rig: Rig, times: float) -> Floats:
             loader = rig.controls[reading.control].loader

@@ -329,7 +329,7 @@ class Reader(Reading):
                 driven_by = sensed.both(
                     nodes.of(rig) + times * noise[0].of(rig), f + times * noise[1], computed
                 )
-                return sensed.zero + drive_linkage(rig, self.control, *driven_by, others)
+                return sensed.at_grip(drive_linkage(rig, self.control, *driven_by, others))
 
             return self._judged(
                 lambda rig: without_backlash_creep(rig, self.control, at, measured), measured
