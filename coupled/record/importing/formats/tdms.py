@@ -53,6 +53,7 @@ def read_tdms(path: Path, content: bytes) -> list[Found]:
                 clocks[clock] = stamps
                 columns.append(Found(stamps, time_s, "s", _own(label, stamps), stamps))
         unit = str(channel.properties.get("unit_string", "")).strip()[:40]
+        unit = "ns" if channel.dtype.kind == "M" else unit
         refused = f"npTDMS does not know what its numbers are: {notes[0]}" if notes else ""
         values = values[:0] if refused else values
         columns.append(Found(str(channel.name), values, unit, _own(label, stamps), stamps, refused))
