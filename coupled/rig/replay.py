@@ -134,7 +134,8 @@ def drive_series(
     gradient, second = gradients
     both = (gradient, gradient if second is None else second)
     begun, position, rate = (none, none, none) if restart is None else restart
-    given = np.stack((*both, none, level, position, rate, *host.rows(frames), begun))
+    rows = (*both, none, level, position, rate, *host.rows(frames), begun)
+    given = np.stack(rows).astype(np.float64)
     computed = np.empty((frames - 1) * rig.substeps + 1)
     served = _served(rig, p, nodes_N, host)
     _loader(p, s, nodes_N, served, given, rig.substeps, h, np.empty((2, frames)), computed)

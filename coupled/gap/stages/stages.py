@@ -269,8 +269,9 @@ class Reader(Reading):
     def _restarts(self, every: int = 0) -> Mask:
         """Return the frames at which a replay restarts as measured; also every `every` frames."""
         frames = np.arange(len(self.record))
-        starts = (frames == 0) & self.begins_moved
-        starts |= False if self.live is None else self.live.starts
+        starts: Mask = (frames == 0) & self.begins_moved
+        if self.live is not None:
+            starts = starts | self.live.starts
         return starts | (frames % every == 0) if every else starts
 
     def _judged(self, predict: Predict, measured: Floats) -> Predict:

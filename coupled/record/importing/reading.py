@@ -205,8 +205,8 @@ def read_log(path: Path, layout: Layout) -> Log:
         return _read_csv(path, content, layout)
     if kind == "json":
         columns, lines, doubled = read_json(path, _text(path, content, layout.encoding))
-        found = np.array(lines, dtype=np.int64)
-        return Log(path, columns, doubled=doubled, lines=found, decimal=layout.decimal)
+        numbered = np.array(lines, dtype=np.int64)
+        return Log(path, columns, doubled=doubled, lines=numbered, decimal=layout.decimal)
     if kind == "parquet":
         columns, notes = read_parquet_separately(path, content)
         return Log(path, columns, notes=notes)
