@@ -90,7 +90,7 @@ _NAMED: Final[dict[str, Unit]] = {
         },
         _TIME: {
             **{"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9},
-            **{"min": 60.0, "h": 3600.0},
+            **{"min": 60.0, "h": 3600.0, "d": 86_400.0},
         },
         _ANGLE: {"rad": 1.0, "mrad": 1e-3, "deg": DEGREE_rad},
         _PRESSURE: {

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from contextlib import ExitStack, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.markup import escape
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from coupled.live.recording import Recording
     from coupled.live.session import LiveFlight
 
+FEW_STALE = 0.01  # share of frames without a new sample that is not mentioned
 _EXAMPLES = (
     "[dim]Examples: coupled live --rig report-column --dashboard · coupled live tracking"
     " · coupled live --rig my-rig.toml --loader udp://192.168.1.20:5760[/]"
@@ -266,6 +268,15 @@ def _views(in_flightgear: str, in_xplane: str) -> list[Watcher]:
     return views
 
 
+def missing(live: Mapping[str, Any], frames: int) -> str:
+    """Return how many packets and samples of a flight were not used; "" if next to none."""
+    dropped, stale = live.get("dropped_packets", {}), live.get("stale_frames", 0)
+    counts = [f"{count} packets dropped: {why}" for why, count in dropped.items()]
+    if stale > FEW_STALE * frames:
+        counts.append(f"{stale} of {frames} frames have no new sample")
+    return "; ".join(counts)
+
+
 def _print(flight: LiveFlight, path: Path) -> None:
     from coupled.record.record import manifest_path
 
@@ -276,7 +287,10 @@ def _print(flight: LiveFlight, path: Path) -> None:
         say(str(flight.lateness))
     if flight.round_trips is not None:
         say(str(flight.round_trips))
-    for name, found in record.manifest["live"]["bend_in_service"].items():
+    live = record.manifest["live"]
+    if lost := missing(live, len(record)):
+        err.print(f"[yellow]{escape(lost)}[/]", soft_wrap=True)
+    for name, found in live["bend_in_service"].items():
         if found["bend"] is not None:
             d = "rad" if name == "wheel" else "m"
             interval = f"{found['low']:.4g} to {found['high']:.4g}"

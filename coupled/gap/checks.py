@@ -117,8 +117,35 @@ def _check_channels(rig: Rig, record: Record, control: ControlName, file: object
             raise InputError(
                 file, name, f"reaches {most:.3g}, beyond {data.travel:g}: is it in another unit?"
             )
+    _check_signs(rig, record, control, file)
     _check_force_unit(rig, record, control, file)
     _check_schedule(rig, record, control, file)
+
+
+def _check_signs(rig: Rig, record: Record, control: ControlName, file: object) -> None:
+    """Raise InputError if the force, or one of two deflections, has a reversed sign."""
+    force = channel(control, "force")
+    both = [channel(control, q) for q in ("computed", "deflection")]
+    moved = [name for name in both if name in record]
+    if not moved:
+        return
+    problem = f"moves against {moved[0]}: one of them is reversed"
+    if len(moved) == 2 and plausible.move_oppositely(record[moved[0]], record[moved[1]]):
+        raise InputError(file, moved[1], problem)
+    passive = rig.controls[control].drive != "setpoint"
+    if passive and force in record and plausible.drives_the_hand(record[force], record[moved[0]]):
+        raise InputError(file, force, problem)
+
+
+def clipped(record: Record, control: ControlName, file: str) -> list[str]:
+    """Return a sentence for each sensor of a control that stays at its largest reading."""
+    names = [channel(control, q) for q in ("force", "computed", "deflection")]
+    ends = {name: plausible.clipped_at(record[name]) for name in names if name in record}
+    return [
+        f"{name} of {file} is clipped at {end:.4g}; no effect explains what is lost beyond."
+        for name, end in ends.items()
+        if end is not None
+    ]
 
 
 def _why_constant(rig: Rig, record: Record, control: ControlName) -> str:

@@ -12,7 +12,7 @@ from functools import partial
 
 from coupled.errors import InputError
 from coupled.gap.chain import AIRFRAME, Part
-from coupled.gap.checks import check_record, check_trim, trim_speed, trimmed
+from coupled.gap.checks import check_record, check_trim, clipped, trim_speed, trimmed
 from coupled.gap.effects.effect import Effect, keys_of
 from coupled.gap.effects.library import library_of
 from coupled.gap.findings.healthy import Baseline
@@ -99,6 +99,8 @@ def prepare(
     if not outputs:
         raise InputError(next(iter(records)), "", _too_little(rig, control, judged.readers))
     left_out = [words for one in live for words in one.left_out]
+    for file, record in records.items() if part.own else ():
+        left_out += clipped(record, control, file)
     if not rig.controls:
         left_out += [words for words in [not_judged(list(records.values()))] if words]
     library = [one for one in library_of(rig, control) if part.frees(keys_of([one]))]

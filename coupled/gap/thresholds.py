@@ -40,6 +40,9 @@ BRIEF_s, FLIGHT_s = 1.0, 15.0  # step: of a trim at a record's start; of a test 
 BRIDGED_s = 0.025  # step: three frames at 120 Hz represent 15 Hz; a hand moves below 5 Hz
 # Step: errors of a state at a restart decay; the shipped loaders' slowest time constant is 0.11 s.
 SETTLE_s, LEAD_s = 0.2, 0.05
+# A record's first place over its range, and first rate over its standard deviation, beyond which
+# its replay does not begin at rest at neutral; more than hum and zero errors; chosen.
+BEGUN_AWAY, BEGUN_MOVING = 0.05, 0.25
 
 # Noise and rounding of a channel (`noise`).
 ROUNDING_SPAN = 1e-6  # tolerance: of a channel's span, the least resolution of a file; ablated

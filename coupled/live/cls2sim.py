@@ -41,6 +41,7 @@ POSITION, APPLIED, SCALE, SCALE_OVERRIDE = 0x11, 0x20, 0x20, 0x01
 ASK, ANSWER = struct.Struct("<3I"), struct.Struct("<HBH")
 WRITE = struct.Struct("<3iH")
 SCALES = (20, 999)
+AGAIN_s = 0.5  # silence after which answers and requests are in step again
 AXES = ("column", "wheel", "pedals")  # elevator, aileron, rudder: bits 0x01 and 0x02 of v2
 MOST_COUNTS = 2**31 - 1
 
@@ -167,6 +168,10 @@ class Version2(_Cls2Sim):
         super().__init__(name, wire, rig, given)
         self._basic = [control.assumed_basic_gradient for control in rig.controls.values()]
         self._bytes = b""
+        self._lengths: dict[int, int] = {}  # the length in the first answer of each size
+        self._astray = False  # an answer had another length: the stream is not in step
+        self._heard_s = -math.inf  # time of the last bytes, s
+        self._refused = False  # one of the pending requests was answered by an error
         self._due: deque[tuple[str, int]] = deque()  # pending requests: kind, control
         self._read = [[0.0, 0.0] for _ in self._controls]
         self._scales = [0] * len(self._controls)
@@ -186,7 +191,8 @@ class Version2(_Cls2Sim):
         return self._basic[i]
 
     def _drain(self) -> Sample | None:
-        self._bytes += self._wire.receive() or b""
+        came = self._heard()
+        self._bytes += came
         found = None
         while self._due:
             kind, i = self._due[0]
@@ -195,18 +201,44 @@ class Version2(_Cls2Sim):
                 break
             if self._bytes[2] != 0:  # an error has no value
                 self.dropped[f"status {self._bytes[2]}"] += 1
-                size = 3
+                size, self._refused = 3, True
             elif len(self._bytes) < size:
                 break
             elif kind != "done":
                 raw = self._bytes[ANSWER.size : size]
                 (value,) = struct.unpack("<f" if kind == "position" else "<i", raw)
                 self._read[i][kind == "position"] = value
+            if self._out_of_step(size):
+                return None
             self._bytes = self._bytes[size:]
             self._due.popleft()
             if not self._due:
-                found = self._sample([self._measured(i) for i in range(len(self._controls))])
+                whole, self._refused = not self._refused, False  # else a number is an old one
+                measured = [self._measured(i) for i in range(len(self._controls))]
+                found = self._sample(measured) if whole else None
         return found if self._requested_s > -math.inf else None
+
+    def _heard(self) -> bytes:
+        """Return the bytes that came; a stream that is not in step begins anew after a silence.
+
+        No request is sent while an answer is pending, so that no late answer follows the silence.
+        """
+        came, now_s = self._wire.receive() or b"", time.monotonic()
+        if came:
+            self._heard_s = now_s
+        elif (self._astray or self._bytes) and now_s - self._heard_s > AGAIN_s:
+            self._bytes, self._astray, self._refused = b"", False, False
+            self._due.clear()
+        return b"" if self._astray else came
+
+    def _out_of_step(self, size: int) -> bool:
+        """Tell whether the next answer's length differs from that of others of its size."""
+        (length,) = struct.unpack_from("<H", self._bytes)
+        self._astray = self._lengths.setdefault(size, length) != length
+        if self._astray:
+            self.dropped["out of step"] += 1
+            self._bytes = b""
+        return self._astray
 
     def _measured(self, i: int) -> Measured:
         counts, share = self._read[i]

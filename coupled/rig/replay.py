@@ -113,25 +113,29 @@ def drive_series(
     rig: Rig,
     control: str,
     nodes_N: Floats,
-    gradient: Floats,
+    gradients: tuple[Floats, Floats | None],
     force_N: Floats,
     load_factor: Floats | None = None,
-    second: Floats | None = None,
     host: Hosted = HOSTED,
     others_N: Mapping[str, Floats] | None = None,
+    restart: Restart | None = None,
 ) -> Floats:
     """Return the reading of the grip's transducer, d, from F alone: loader and linkage in series.
 
     `nodes_N` is the loader's input F in N on its nodes (with crosstalk), `force_N` F at the frames,
-    which bends the structure. The other arguments are those of `drive_loader` and `replay_linkage`.
-    δc is predicted, not measured, and the host reads it without error.
+    which bends the structure. `gradients` are G_T and that beyond the break. The other arguments
+    are those of `drive_loader` and `replay_linkage`. δc is predicted, not measured, and the host
+    reads it without error.
     """
     p, s = _one(rig, control)
     frames = len(force_N)
     level = np.ones(frames) if load_factor is None else load_factor
     h, none = 1.0 / (rig.frame_rate * rig.substeps), np.zeros(frames)
+    gradient, second = gradients
     both = (gradient, gradient if second is None else second)
-    given = np.stack((*both, none, level, none, none, *host.rows(frames), none))
+    begun, position, rate = (none, none, none) if restart is None else restart
+    rows = (*both, none, level, position, rate, *host.rows(frames), begun)
+    given = np.stack(rows).astype(np.float64)
     computed = np.empty((frames - 1) * rig.substeps + 1)
     served = _served(rig, p, nodes_N, host)
     _loader(p, s, nodes_N, served, given, rig.substeps, h, np.empty((2, frames)), computed)

@@ -171,6 +171,44 @@ def test_v2_takes_a_late_answer_for_what_it_answers() -> None:
         assert sample.controls[0].computed == 0.5 * RIG.controls["column"].travel
 
 
+@pytest.mark.parametrize(
+    "damage", [lambda b: b"\0" + b, lambda b: b[:-3], lambda b: b[4:]], ids=["more", "cut", "less"]
+)
+def test_v2_takes_no_number_from_a_stream_out_of_step_and_finds_its_step_again(
+    damage: Callable[[bytes], bytes],
+) -> None:
+    """Bytes too many or too few made forces of 2,500 N of the bytes of places, or lost the link."""
+    with version2(V2) as (link, wire):
+        asked(link, wire, 500.0, 1500, 0.25)
+        assert link.receive(1.0) is not None
+        order = (Order(500.0, 500.0, 0.0, 0.0, 0.0, 0.0, 0.0),)
+        both = struct.pack("<HBHi", 9, 0, 1, -700) + struct.pack("<HBHf", 9, 0, 1, 0.5)
+        for answer in (damage(both), both):
+            link.send(order, RUN)
+            assert len(wire.recv(256)) == 2 * 12
+            wire.sendall(answer)
+            sample = link.receive(0.1)
+            if answer is both:
+                break
+            assert sample is None
+            time.sleep(0.6)  # longer than the silence
+            assert link.receive(0.05) is None
+        assert sample is not None
+        assert sample.controls[0].force == -7.0
+        assert sample.controls[0].computed == 0.5 * RIG.controls["column"].travel
+
+
+def test_v2_repeats_no_number_where_a_request_is_refused() -> None:
+    with version2(V2) as (link, wire):
+        asked(link, wire, 500.0, 1500, 0.25)
+        assert link.receive(1.0) is not None
+        link.send((Order(500.0, 500.0, 0.0, 0.0, 0.0, 0.0, 0.0),), RUN)
+        wire.recv(256)
+        wire.sendall(struct.pack("<HB", 3, 7) + struct.pack("<HBHf", 9, 0, 1, 0.5))
+        assert link.receive(0.2) is None
+        assert link.dropped == {"status 7": 1}
+
+
 @pytest.mark.parametrize("share", [1.1, -1.1, 2.9])
 def test_v2_drops_a_position_beyond_its_range(share: float) -> None:
     with version2(V2) as (link, wire):

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from coupled.cli.live import missing
 from coupled.record.record import read_record
 from tests.support.commands import coupled
 
@@ -70,3 +71,11 @@ def test_a_signal_leaves_a_complete_record(number: int, code: int, tmp_path: Pat
     assert len(record) > 10
     assert record.manifest["live"]["stopped"]
     assert record.manifest["ended_early"] is None
+
+
+def test_lost_packets_and_samples_are_said() -> None:
+    live = {"dropped_packets": {"not a number": 400}, "stale_frames": 381}
+    said = "400 packets dropped: not a number; 381 of 1080 frames have no new sample"
+    assert missing(live, 1080) == said
+    assert missing({"dropped_packets": {}, "stale_frames": 2}, 1080) == ""
+    assert "frames" in missing({"dropped_packets": {}, "stale_frames": 90}, 1080)

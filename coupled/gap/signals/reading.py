@@ -23,6 +23,7 @@ from coupled.gap.signals.floors import Drive, floor_from, noise_in
 from coupled.gap.signals.live import Assumed, Live, Mask, live_of
 from coupled.gap.signals.missed import Missed, missed_in
 from coupled.gap.signals.output import Floats
+from coupled.gap.thresholds import BEGUN_AWAY, BEGUN_MOVING, SETTLE_s
 from coupled.record.channels import SURFACES, ControlName, channel
 from coupled.record.record import Record
 from coupled.rig.crossing import leaking
@@ -151,7 +152,25 @@ class Reading:
     @property
     def judged(self) -> Mask | None:
         """The rows in which stages of the loader are judged; None for all."""
-        return None if self.live is None or self.live.judged.all() else self.live.judged
+        judged = None if self.live is None or self.live.judged.all() else self.live.judged
+        if not self.begins_moved:
+            return judged
+        settled = np.arange(len(self.record)) >= SETTLE_s * self.rig.frame_rate
+        return settled if judged is None else judged & settled
+
+    @cached_property
+    def begins_moved(self) -> bool:
+        """Whether the loader is displaced or moves as the record begins, as after a cut.
+
+        A replay then begins at the measured state, and not at rest at neutral.
+        """
+        name = self.name_of("deflection" if self.in_series else "computed")
+        if name not in self.record or self.moved or self.set_points:
+            return False
+        place = smoothed(self._measured(name))
+        rate = np.gradient(place)
+        away = abs(float(place[0])) > BEGUN_AWAY * float(np.ptp(place))
+        return away or abs(float(rate[0])) > BEGUN_MOVING * float(np.std(rate))
 
     def assumed(self) -> Assumed | None:
         """Return K̂ in use, if it changed in flight."""

@@ -44,7 +44,7 @@ from numpy.typing import NDArray
 
 from coupled.gap.effects.settings import CONTACT, is_dry, most_yielding
 from coupled.gap.noise.noise import Noise
-from coupled.gap.noise.smooth import smoothed
+from coupled.gap.noise.smooth import rate_of, smoothed
 from coupled.gap.signals.floors import Drive, with_error
 from coupled.gap.signals.output import Floats, Predict
 from coupled.gap.signals.reading import Reading
@@ -55,7 +55,7 @@ from coupled.rig.hosted import Hosted
 from coupled.rig.imposed import answer_to, behind_linkage
 from coupled.rig.nodes import Nodes
 from coupled.rig.recorder import stamped
-from coupled.rig.replay import drive_series
+from coupled.rig.replay import Restart, drive_series
 from coupled.rig.rig import Rig
 
 RATCHET = 1.0 / (2.0**0.5 - 1.0)  # noise of √2 times the size causes √2 times the creep
@@ -196,6 +196,7 @@ class Series:
         self._reading, self.force, self._hosted = reading, force, hosted
         self._gradient, self._second = reading.gradient(), reading.second()
         self._load = reading.load()
+        self._grip = smoothed(reading.signal("deflection"))
         self._others = {name: smoothed(other) for name, other in reading.others().items()}
         self._leaks = [Nodes(smoothed(other)) for other in reading.partner()]
         self._trembling = force.passed(np.random.default_rng(SAMPLED))
@@ -216,8 +217,9 @@ class Series:
             if self._leaks and (share := rig.controls[reading.control].loader.crosstalk):
                 pull = pull + share * self._leaks[0].of(rig)
             host = self._hosted._replace(missed=reading.missed.under(rig, reading.control))
-            driven_by = (pull, self._gradient, bending, self._load(rig), self._second)
-            read = drive_series(rig, reading.control, *driven_by, host, self._others)
+            driven_by = (pull, (self._gradient, self._second), bending, self._load(rig))
+            begun = self._begun(rig, bending)
+            read = drive_series(rig, reading.control, *driven_by, host, self._others, begun)
             return sensed.at_grip(read)
 
         def taken_up(rig: Rig, times: float) -> Floats:
@@ -232,6 +234,15 @@ class Series:
             return np.where(acts, held + half * np.sign(true), free)
 
         return taken_up if reading.by_hand else at
+
+    def _begun(self, rig: Rig, bending: Floats) -> Restart | None:
+        """Return the measured start of the loader, if the record does not begin at rest."""
+        reading = self._reading
+        if not reading.begins_moved:
+            return None
+        bend = rig.controls[reading.control].loader.bend
+        place = self._grip - reading.sensed(rig).zero - bend * bending
+        return np.arange(len(place)) == 0, place, rate_of(place, rig.frame_rate)
 
     def _predicted(self, force: Floats, times: float) -> Predict:
         reading, at = self._reading, self._driven(force)

@@ -17,6 +17,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -268,7 +269,9 @@ class Reader(Reading):
     def _restarts(self, every: int = 0) -> Mask:
         """Return the frames at which a replay restarts as measured; also every `every` frames."""
         frames = np.arange(len(self.record))
-        starts = np.zeros(len(frames), dtype=bool) if self.live is None else self.live.starts
+        starts: Mask = (frames == 0) & self.begins_moved
+        if self.live is not None:
+            starts = starts | self.live.starts
         return starts | (frames % every == 0) if every else starts
 
     def _judged(self, predict: Predict, measured: Floats) -> Predict:
@@ -296,8 +299,13 @@ class Reader(Reading):
         series = Series(self, force, hosted_by(self))
         own = self.channel_noise("deflection")
         driven_by = DrivenBy("force")
-        made = (self.name_of("deflection"), grip, series.predict(own), series.noisy, own, driven_by)
-        found = replace(self._made("loader", *made), in_series=True)
+        predict = self._judged(series.predict(own), grip)
+
+        def noisy(rig: Rig, k: int) -> Floats:
+            return self._judged(partial(series.noisy, k=k), grip)(rig)
+
+        made = (self.name_of("deflection"), grip, predict, noisy, own, driven_by)
+        found = replace(self._made("loader", *made, judged=self.judged), in_series=True)
         return [found.under(series.force.noise)]
 
     def _answering(self) -> list[Output]:

@@ -6,6 +6,7 @@ The library says in which stages an effect shows. What a record holds changes th
     imposed motion                 they show in the force; the motion of the grip is given
     set points                     a commanded number has no sensor, and the servo has reached the
                                    speed that the grip was measured at
+    a wheel, or no length of arm   the grip's arc has no radius
     no lateral motion              effects that show in it are not tried; nor are those of parts
                                    that the aircraft's model lacks
 """
@@ -41,6 +42,7 @@ from coupled.resources import aircraft_folder
 from coupled.rig.rig import Rig
 
 OF_PLAY = "loader.play"  # its key in a rig file without the unit
+ARC = "loader.arc_geometry"
 GRAVITY = "loader.gravity_N"
 PARTS = {alteration.part.name for alteration in ALTERATIONS}
 RATE_LIMIT = "loader.servo_rate_limit_{d}_per_s"
@@ -53,6 +55,8 @@ def tried_effects(
     records, control = [reader.record for reader in readers], readers[0].control
     known = [effect for effect in library if effect.can_be_tried(records, control)]
     known = _of_aircraft(known, readers[0].rig, records)
+    if not has_arc(readers[0].rig, control):
+        known = [one for one in known if all(p.key != ARC for p in one.parameters)]
     known = as_judged(known, readers, outputs)
     if not _turns_far(readers):
         known = [one for one in known if all(p.key != GRAVITY for p in one.parameters)]
@@ -61,6 +65,12 @@ def tried_effects(
         known = _under_set_points(known, records, control)
     judged = {output.stage for output in outputs}
     return [effect for effect in known if judged & {*effect.shows_in}]
+
+
+def has_arc(rig: Rig, control: ControlName) -> bool:
+    """Tell whether a rig file gives the radius on which its grip may move."""
+    data = rig.controls.get(control)
+    return data is not None and unit_of(control) == "m" and data.length > 2.0 * data.travel / np.pi
 
 
 def _turns_far(readers: Sequence[Reader]) -> bool:

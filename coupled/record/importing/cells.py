@@ -18,6 +18,7 @@ Floats = NDArray[np.float64]
 Line = Callable[[int], int]
 ISO = "iso"
 _DAY_us = 86_400_000_000
+_HOUR_us = _DAY_us // 24
 MOST_STEPS = 2.0  # step across a wrap, over the largest other step, with the right period
 PERIOD = 0.002  # tolerance of a period for counts and noise, relative
 FARTHEST = 0.25  # of a turn between two rows; from a half on, the direction is ambiguous
@@ -157,8 +158,8 @@ def signed(raw: Floats, channel: Channel, file: object, line: Line) -> Floats:
 
     `sign_bit` n: a set bit n means minus, the bits below it are the magnitude. `wraps_at` N:
     integer counts from N/2 on are reduced by N (two's complement, read as unsigned). With `unwrap`,
-    and for numbers that are not integers, the angle is unwrapped at the period N, from a first
-    number between −N/2 and N/2.
+    and for numbers that are not integers, the angle is unwrapped at the period N, from the turn in
+    which its first number is nearest neutral: the map's offset may be that of an encoder.
     """
     if channel.sign_bit is None and channel.wraps_at is None:
         return raw
@@ -189,7 +190,7 @@ def signed(raw: Floats, channel: Channel, file: object, line: Line) -> Floats:
 
 
 def _unwrapped(raw: Floats, channel: Channel, file: object, line: Line) -> Floats:
-    """Return an angle unwrapped at its period, with its first number within half of it."""
+    """Return an angle unwrapped at its period, its first number within half of it of neutral."""
     period, name = channel.wraps_at or 0.0, channel.source
     there = np.isfinite(raw)
     values = raw[there]
@@ -200,7 +201,7 @@ def _unwrapped(raw: Floats, channel: Channel, file: object, line: Line) -> Float
         problem = f"spans {span:.6g}, more than wraps_at = {period:g}: it starts again later"
         raise InputError(file, name, problem)
     turned = np.unwrap(values, period=period)
-    turned -= period * np.round(values[0] / period)
+    turned -= period * np.round((values[0] + channel.offset / channel.scale) / period)
     far = np.abs(np.diff(turned)) > FARTHEST * period
     if far.any():
         row = int(np.flatnonzero(there)[int(np.argmax(far)) + 1])
@@ -242,12 +243,14 @@ def moments(column: pl.Series, pattern: str, file: object, name: str, line: Line
     """Return dates or times of day as integer microseconds, shape (rows,).
 
     `pattern` is `iso` (2026-03-01 12:00:00.5, 12:00:00.5, with or without T and time zone) or a
-    pattern of strptime (`%d.%m.%Y %H:%M:%S.%f`). Times of day continue past midnight.
+    pattern of strptime (`%d.%m.%Y %H:%M:%S.%f`). Times without a date continue past midnight,
+    those without hours past the hour.
     """
     if column.dtype != pl.String:
         raise InputError(file, name, "holds numbers, no dates: leave clock.date out")
     counts: list[int] = []
-    days = 0
+    period = _period_us(pattern)
+    past = 0
     for row, cell in enumerate(column.to_list()):
         try:
             moment = _moment(str(cell or "").strip(), pattern)
@@ -256,14 +259,31 @@ def moments(column: pl.Series, pattern: str, file: object, name: str, line: Line
             raise InputError(file, name, problem) from None
         if isinstance(moment, time):
             count = (moment.hour * 60 + moment.minute) * 60 + moment.second
-            count = count * 1_000_000 + moment.microsecond + days * _DAY_us
-            if counts and count < counts[-1] - _DAY_us // 2:
-                days += 1
-                count += _DAY_us
+            count = count * 1_000_000 + moment.microsecond + past
+            if counts and count < counts[-1] - period // 2:
+                past += period
+                count += period
         else:
             count = (moment - _EPOCH) // timedelta(microseconds=1)
         counts.append(count)
     return pl.Series(name, counts, dtype=pl.Int64)
+
+
+def _period_us(pattern: str) -> int:
+    """Return the time after which times of a pattern without a date repeat, in µs."""
+    if pattern == ISO or "%H" in pattern or ("%I" in pattern and "%p" in pattern):
+        return _DAY_us
+    if "%I" in pattern:
+        return _DAY_us // 2
+    return _HOUR_us if "%M" in pattern else _HOUR_us // 60
+
+
+def continued(clock_us: pl.Series) -> pl.Series:
+    """Return times of day in integer microseconds, continued past midnight."""
+    counts = clock_us.to_numpy().astype(np.float64)
+    there = np.isfinite(counts)
+    counts[there] = np.unwrap(counts[there], period=_DAY_us)
+    return pl.Series(clock_us.name, counts, nan_to_null=True).cast(pl.Int64)
 
 
 def _moment(text: str, pattern: str) -> datetime | time:

@@ -131,19 +131,20 @@ def known_map(path: Path) -> tuple[str, LogMap]:
     ordered = {name: channels[name] for name in CHANNELS if name in channels}
     layout = Layout(format="csv", delimiter=head.delimiter)
     angles = [names.index(channels[name].source) for name in ANGLES if name in channels]
-    start_s = _trimmed_from(text, angles) if head.program == "JSBSim" else 0.0
+    jsbsim = head.program == "JSBSim"
+    start_s = _trimmed_from(text, head.delimiter, angles) if jsbsim else 0.0
     clock = Clock(source=head.time, unit="s", start=start_s)
     return head.program, LogMap(log=layout, clock=clock, channels=ordered)
 
 
-def _trimmed_from(text: str, columns: Sequence[int]) -> float:
+def _trimmed_from(text: str, delimiter: str, columns: Sequence[int]) -> float:
     """Return the start of JSBSim's log in s: its second row if the first is from before the trim.
 
     An angle that no force can move within a frame then jumps once.
     """
     lines = [line for line in text.splitlines() if line.strip()][1:5]
     try:
-        rows = np.array([[float(cell) for cell in line.split(",")] for line in lines])
+        rows = np.array([[float(cell) for cell in line.split(delimiter)] for line in lines])
     except ValueError:
         return 0.0
     if len(rows) < 4 or not columns:

@@ -1,7 +1,9 @@
 """Logs in JSON: a list of rows, a table of columns, or one row a line (JSON Lines).
 
 A row is an object; objects within it become columns named `outer.inner`. A cell may be a list, of
-which a map takes an `element`. A row that lacks a column has an empty cell there.
+which a map takes an `element`. A row that lacks a column has an empty cell there. An object around
+the one list of rows or the columns may hold other values, which are left out. Of cells of one name
+the second is `name#2`.
 """
 
 from __future__ import annotations
@@ -14,6 +16,7 @@ from typing import Any
 import polars as pl
 
 from coupled.errors import InputError, shown
+from coupled.record.importing.formats.columns import named_apart
 
 DEEPEST = 8  # objects within objects
 WANTED = (
@@ -21,13 +24,15 @@ WANTED = (
 )
 
 
-def read_json(path: Path, text: str) -> tuple[dict[str, pl.Series], list[int]]:
-    """Return the columns of a JSON log by name, and the line of each row, from 1.
+def read_json(
+    path: Path, text: str
+) -> tuple[dict[str, pl.Series], list[int], dict[str, tuple[str, ...]]]:
+    """Return the columns of a JSON log by name, the line of each row, and the doubled names.
 
-    Rows of a list are numbered instead. Raises InputError, naming the line.
+    Lines count from 1; rows of a list are numbered instead. Raises InputError, naming the line.
     """
     try:
-        whole = json.loads(text)
+        whole = json.loads(text, object_pairs_hook=_named_apart)
     except RecursionError:
         raise InputError(path, "", "nests too deeply to be a log") from None
     except ValueError:
@@ -39,7 +44,8 @@ def read_json(path: Path, text: str) -> tuple[dict[str, pl.Series], list[int]]:
     names = list(dict.fromkeys(name for row in flat for name in row))
     if not names:
         raise InputError(path, "", f"holds no rows; give {WANTED}")
-    return {name: _column(name, [row.get(name) for row in flat]) for name in names}, lines
+    columns = {name: _column(name, [row.get(name) for row in flat]) for name in names}
+    return columns, lines, _doubled(names)
 
 
 def _by_lines(path: Path, text: str) -> tuple[list[Any], list[int]]:
@@ -49,7 +55,7 @@ def _by_lines(path: Path, text: str) -> tuple[list[Any], list[int]]:
         if not line.strip():
             continue
         try:
-            rows.append(json.loads(line))
+            rows.append(json.loads(line, object_pairs_hook=_named_apart))
         except (ValueError, RecursionError):
             problem = f"line {number} is no JSON: {shown(line.strip(), 40)!r}; give {WANTED}"
             raise InputError(path, "", problem) from None
@@ -61,14 +67,19 @@ def _rows_of(path: Path, whole: Any) -> list[Any]:
     """Return the rows of one JSON value: a list of them, a table of columns, or a single row."""
     if isinstance(whole, list):
         return whole
-    if isinstance(whole, dict) and whole and all(isinstance(v, list) for v in whole.values()):
-        lengths = {name: len(column) for name, column in whole.items()}
+    if isinstance(whole, dict):
+        columns = {name: cells for name, cells in whole.items() if isinstance(cells, list)}
+        of_rows = [cells for cells in columns.values() if cells and isinstance(cells[0], dict)]
+        if of_rows and len(columns) == 1:
+            return of_rows[0]
+        if not columns:
+            return [whole]
+        lengths = {name: len(column) for name, column in columns.items()}
         if len(set(lengths.values())) > 1:
             each = ", ".join(f"{shown(name, 20)} {n}" for name, n in list(lengths.items())[:4])
             raise InputError(path, "", f"has columns of different lengths: {each}")
-        return [dict(zip(whole, cells, strict=True)) for cells in zip(*whole.values(), strict=True)]
-    if isinstance(whole, dict):
-        return [whole]
+        rows = zip(*columns.values(), strict=True)
+        return [dict(zip(columns, cells, strict=True)) for cells in rows]
     raise InputError(path, "", f"is no table; give {WANTED}")
 
 
@@ -81,10 +92,31 @@ def _flattened(
     found: dict[str, Any] = {}
     for name, cell in row.items():
         if isinstance(cell, Mapping):
-            found |= _flattened(path, number, cell, f"{before}{name}.", deep + 1)
+            inner = _flattened(path, number, cell, f"{before}{name}.", deep + 1)
         else:
-            found[f"{before}{name}"] = cell
+            inner = {f"{before}{name}": cell}
+        both = found.keys() & inner.keys()
+        if both:
+            problem = f"row {number} has two cells of this name: rename one"
+            raise InputError(path, min(both), problem)
+        found |= inner
     return found
+
+
+def _doubled(names: Sequence[str]) -> dict[str, tuple[str, ...]]:
+    """Return {duplicate name: its names by `_named_apart`}."""
+    found: dict[str, list[str]] = {}
+    for name in names:
+        own, _, count = name.rpartition("#")
+        if own and count.isdecimal() and own not in names:
+            found.setdefault(own, []).append(name)
+    return {own: tuple(each) for own, each in found.items() if len(each) > 1}
+
+
+def _named_apart(cells: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Return an object's cells by name; of cells of one name, as `name#1`, `name#2`."""
+    names, _ = named_apart([name for name, _ in cells])
+    return dict(zip(names, (cell for _, cell in cells), strict=True))
 
 
 def _column(name: str, cells: Sequence[Any]) -> pl.Series:

@@ -231,7 +231,7 @@ def _check_stamps(clock: Stamped, path: Path, key: str) -> None:
     dropped_rows(clock, path, key)
     if clock.date and clock.wraps_at is not None:
         raise InputError(path, f"{key}.wraps_at", "is for a counter; dates do not wrap: leave out")
-    unit = known_unit(clock.unit or "s", path, f"{key}.unit")
+    unit = known_unit(clock.unit or "s", path, f"{key}.unit", like="s")
     if unit.dimension != _own("s").dimension:
         fit = ", ".join(units_like(_own("s")))
         raise InputError(path, f"{key}.unit", f"{clock.unit!r} is {unit.word}; give one of {fit}")
@@ -271,11 +271,11 @@ def _own(text: str) -> Unit:
     return unit
 
 
-def known_unit(text: str, file: object, key: str) -> Unit:
-    """Return the unit of a text; raises InputError with the nearest known one."""
+def known_unit(text: str, file: object, key: str, like: str = "") -> Unit:
+    """Return the unit of a text; raises InputError with the nearest one, as of units `like` one."""
     unit = parse_unit(text)
     if unit is None:
-        hint = nearest(text, unit_names())
+        hint = nearest(text, units_like(_own(like)) if like else unit_names())
         raise InputError(file, key, f"{text[:40]!r} is no known unit; {hint}")
     return unit
 

@@ -26,6 +26,8 @@ _LENGTHS = {"in": 0.0254, "cm": 0.01, "mm": 1e-3, "ft": 0.3048}
 _ANGLE = {"deg": np.pi / 180.0}
 TOGETHER = 0.6  # correlation of a force with a spring's, from which its ratio shows its unit
 WHOLE_RANGE = 0.9  # of the range: jump of a position that wraps
+END_OVER_STEP = 20.0  # least jump of a spike in the first or last row, over the step beside it
+LEAST_POWER = 0.05  # correlation of force and rate from which power has a sign
 SMALL_STEP = 0.2  # of the range: largest other step of a position from row to row
 _D4 = np.sqrt(70.0)  # fourth differences of white noise: 1, 4, 6, 4, 1 squared and summed
 
@@ -83,10 +85,11 @@ def clipped_at(values: Floats) -> float | None:
     """Return the extreme at which a noisy channel is constant for five rows or more."""
     if noise_level(values) == 0.0:
         return None
-    still = np.diff(values) == 0.0
-    for extreme in (float(values.max()), float(values.min())):
-        at = values == extreme
-        if _longest(at) >= max(5, 4 * (1 + _longest(still & ~at[1:]))):
+    ends = float(values.max()), float(values.min())
+    between = ~np.isin(values, ends)
+    still = (np.diff(values) == 0.0) & between[1:]
+    for extreme in ends:
+        if _longest(values == extreme) >= max(5, 4 * (1 + _longest(still))):
             return extreme
     return None
 
@@ -113,14 +116,19 @@ def quantised_step(values: Floats) -> float | None:
 
 
 def spikes(values: Floats) -> list[int]:
-    """Return the rows that differ from neighbours which agree."""
+    """Return the rows that differ from neighbours which agree; at an end, from the next two."""
     if values.size < 5:
         return []
     deviation = values[1:-1] - 0.5 * (values[2:] + values[:-2])
     spacing = np.abs(values[2:] - values[:-2])
     least = max(12.0 * noise_level(values), 0.02 * float(np.ptp(values)))
     single = (np.abs(deviation) > least) & (3.0 * spacing < np.abs(deviation))
-    return [int(row) + 1 for row in np.flatnonzero(single)]
+    found = [int(row) + 1 for row in np.flatnonzero(single)]
+    for end, beside, other in ((0, 1, 2), (-1, -2, -3)):
+        off, apart = abs(values[end] - values[beside]), abs(values[beside] - values[other])
+        if off > max(least, END_OVER_STEP * apart):
+            found.append(end % values.size)
+    return sorted(found)
 
 
 def starts_again(values: Floats) -> int | None:
@@ -209,6 +217,20 @@ def move_oppositely(first: Floats, second: Floats) -> bool:
     a, b = first - np.median(first), second - np.median(second)
     scale = float(np.sqrt((a @ a) * (b @ b)))
     return scale > 0.0 and float(a @ b) / scale < -0.3
+
+
+def drives_the_hand(force_N: Floats, deflection: Floats) -> bool:
+    """Tell whether a force's spring and power are both negative, as of a reversed sensor.
+
+    At a fast motion inertia alone turns the force against the deflection, but a loader takes power
+    from the hand at any rate.
+    """
+    rate = np.gradient(deflection)
+    terms = np.column_stack([np.ones(rate.size), deflection, rate, np.gradient(rate)])
+    spring = np.linalg.lstsq(terms, force_N, rcond=None)[0][1]
+    force = force_N - force_N.mean()
+    scale = float(np.sqrt((force @ force) * (rate @ rate)))
+    return bool(spring < 0.0) and float(force @ rate) < -LEAST_POWER * scale
 
 
 def lacks_its_sign(force_N: Floats, deflection: Floats) -> bool:

@@ -5,8 +5,8 @@ Columns of a log need not be numbers: only those in the map are parsed.
 
 from __future__ import annotations
 
+import csv
 import io
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
@@ -20,8 +20,15 @@ from numpy.typing import NDArray
 from coupled.errors import InputError, nearest, shown
 from coupled.files import read_bytes
 from coupled.record.csvfile import check_numeric, first_line, numbers
-from coupled.record.importing.cells import Place, element, labels_of, moments, signed
-from coupled.record.importing.formats.columns import Found
+from coupled.record.importing.cells import (
+    Place,
+    continued,
+    element,
+    labels_of,
+    moments,
+    signed,
+)
+from coupled.record.importing.formats.columns import Found, named_apart
 from coupled.record.importing.jsonlog import read_json
 from coupled.record.importing.mapping import Channel, Layout, Stamped, known_unit
 from coupled.record.importing.separate import read_parquet_separately, read_separately
@@ -128,6 +135,8 @@ class Log:
             return _counted(column, 1_000_000)
         if column.dtype == pl.Date:
             raise InputError(self.file, name, "holds days, without a time of day")
+        if column.dtype == pl.Time:
+            return _counted(continued(column.to_physical() // 1000), 1_000_000)
         if column.dtype.is_temporal():
             unit = getattr(column.dtype, "time_unit", None)
             return _counted(column.to_physical(), {"ms": 10**3, "us": 10**6}.get(str(unit), 10**9))
@@ -195,8 +204,9 @@ def read_log(path: Path, layout: Layout) -> Log:
     if kind == "csv":
         return _read_csv(path, content, layout)
     if kind == "json":
-        columns, lines = read_json(path, _text(path, content, layout.encoding))
-        return Log(path, columns, lines=np.array(lines, dtype=np.int64), decimal=layout.decimal)
+        columns, lines, doubled = read_json(path, _text(path, content, layout.encoding))
+        numbered = np.array(lines, dtype=np.int64)
+        return Log(path, columns, doubled=doubled, lines=numbered, decimal=layout.decimal)
     if kind == "parquet":
         columns, notes = read_parquet_separately(path, content)
         return Log(path, columns, notes=notes)
@@ -205,7 +215,7 @@ def read_log(path: Path, layout: Layout) -> Log:
 
 
 def _log(path: Path, found: list[Found]) -> Log:
-    names, doubled = _apart([column.name for column in found])
+    names, doubled = named_apart([column.name for column in found])
     found = [replace(column, name=name) for column, name in zip(found, names, strict=True)]
     return Log(
         path,
@@ -216,22 +226,6 @@ def _log(path: Path, found: list[Found]) -> Log:
         stamps={c.name: c.stamps for c in found if c.stamps},
         refused={c.name: c.refused for c in found if c.refused},
     )
-
-
-def _apart(names: Sequence[str]) -> tuple[list[str], dict[str, tuple[str, ...]]]:
-    """Return unique names, and {duplicate name: its unique names}."""
-    times = Counter(names)
-    doubled: dict[str, list[str]] = {name: [] for name, count in times.items() if count > 1}
-    unique = []
-    for name in names:
-        own = name
-        if name in doubled:
-            own = f"{name}#{len(doubled[name]) + 1}"
-            while own in times:  # another column has this name
-                own = own.replace("#", "##", 1)
-            doubled[name].append(own)
-        unique.append(own)
-    return unique, {name: tuple(own) for name, own in doubled.items()}
 
 
 def _which(names: Sequence[str]) -> str:
@@ -251,15 +245,7 @@ def _read_csv(path: Path, content: bytes, layout: Layout) -> Log:
     if delimiter == " ":  # any white space
         kept = ["\t".join(line.split()) for line in kept]
         delimiter = "\t"
-    try:
-        table = pl.read_csv(
-            io.BytesIO("\n".join(kept).encode()),
-            has_header=False,
-            infer_schema=False,
-            separator=delimiter,
-        )
-    except (pl.exceptions.PolarsError, OSError, ValueError) as error:
-        raise InputError(path, "", f"is not a table: {first_line(error)}") from None
+    table = _table(path, kept, lines, delimiter)
     heads = 1 if layout.header else 0
     under = heads + (1 if layout.units_row else 0)
     if table.height <= under:
@@ -267,7 +253,7 @@ def _read_csv(path: Path, content: bytes, layout: Layout) -> Log:
     names = [str(i + 1) for i in range(table.width)]
     if layout.header:
         names = [(cell or "").strip() for cell in table.row(0)]
-    names, doubled = _apart(names)
+    names, doubled = named_apart(names)
     units = dict(zip(names, table.row(heads), strict=True)) if layout.units_row else {}
     columns = {}
     for name, column in zip(names, table.slice(under).get_columns(), strict=True):
@@ -282,6 +268,27 @@ def _read_csv(path: Path, content: bytes, layout: Layout) -> Log:
         whole,
         decimal=layout.decimal,
     )
+
+
+def _table(path: Path, kept: list[str], lines: Sequence[int], delimiter: str) -> pl.DataFrame:
+    """Return the cells of a CSV's lines as text.
+
+    Lines may end in more delimiters than the first one. Raises InputError for further cells.
+    """
+    text = io.BytesIO("\n".join(kept).encode())
+    try:
+        return pl.read_csv(text, has_header=False, infer_schema=False, separator=delimiter)
+    except (pl.exceptions.PolarsError, OSError, ValueError) as error:
+        width, *others = (len(row) for row in csv.reader(kept, delimiter=delimiter))
+        long = next((row for row, cells in enumerate(others, 1) if cells > width), None)
+        if long is None or len(others) + 1 != len(kept):  # a cell contained a line end
+            raise InputError(path, "", f"is not a table: {first_line(error)}") from None
+    plain = [kept[0], *(line.rstrip().rstrip(delimiter) for line in kept[1:])]
+    if all(len(row) <= width for row in csv.reader(plain, delimiter=delimiter)):
+        return _table(path, plain, lines, delimiter)
+    problem = f"row {lines[long]} has {others[long - 1]} cells, the first row {width}:"
+    problem += " another log.delimiter, or log.skip_rows = lines before the header?"
+    raise InputError(path, "", problem)
 
 
 def _text(path: Path, content: bytes, encoding: str) -> str:

@@ -122,8 +122,10 @@ def clock_of(log: Log, log_map: LogMap) -> Clock | OtherClock:
             sort=clock.sort,
             drop_duplicates=clock.drop_duplicates,
         )
+    own = log.stamps[next(iter(log.columns))]
     return OtherClock.model_construct(
-        source=log.stamps[next(iter(log.columns))],
+        source=own,
+        unit="" if log.units.get(own) else clock.unit,
         sort=clock.sort,
         drop_duplicates=clock.drop_duplicates,
     )

@@ -19,6 +19,7 @@ ROWS = [
     {"t": float(t), "joint": {"angle": float(a), "torque": float(m)}, "q": [float(a), 7.0]}
     for t, a, m in zip(TIME_s, ANGLE_deg, TORQUE_Nm, strict=True)
 ]
+COLUMNS = list(zip(TIME_s.tolist(), ANGLE_deg.tolist(), TORQUE_Nm.tolist(), strict=True))
 MAP = """
 [clock]
 from = "t"
@@ -53,6 +54,37 @@ def test_json_in_a_list_or_a_row_a_line_is_one_record(tmp_path: Path, text: str,
     assert record["wheel_deflection_rad"] == pytest.approx(np.deg2rad(ANGLE_deg))
     assert record["wheel_force_N"] == pytest.approx(TORQUE_Nm / 0.2)
     assert not record["dynamic_pressure_Pa"].any()
+
+
+@pytest.mark.parametrize(
+    "around",
+    [
+        {"rig": "j1", "rows": ROWS},
+        {
+            "rig": "j1",
+            "t": TIME_s.tolist(),
+            "joint.angle": ANGLE_deg.tolist(),
+            "joint.torque": TORQUE_Nm.tolist(),
+        },
+    ],
+    ids=["rows", "columns"],
+)
+def test_rows_or_columns_may_have_a_head_beside_them(tmp_path: Path, around: object) -> None:
+    record = made(tmp_path, json.dumps(around))
+    assert record["wheel_deflection_rad"] == pytest.approx(np.deg2rad(ANGLE_deg))
+    assert record["wheel_force_N"] == pytest.approx(TORQUE_Nm / 0.2)
+
+
+def test_no_cell_replaces_another_of_its_name(tmp_path: Path) -> None:
+    rows = [f'{{"t": {t}, "a": {a}, "a": 9.0, "F": {m}}}' for t, a, m in COLUMNS]
+    named = MAP.replace("joint.torque", "F").replace("joint.angle", "{}")
+    with pytest.raises(InputError, match='a: two columns have this name; give from = "a#1" or'):
+        made(tmp_path, "\n".join(rows), named.format("a"))
+    record = made(tmp_path, "\n".join(rows), named.format("a#1"))
+    assert record["wheel_deflection_rad"] == pytest.approx(np.deg2rad(ANGLE_deg))
+    both = json.dumps([{**row, "joint.angle": 0.0} for row in ROWS])
+    with pytest.raises(InputError, match=r"joint\.angle: row 1 has two cells of this name"):
+        made(tmp_path, both)
 
 
 def test_a_table_of_columns_and_an_element_of_a_list_are_read(tmp_path: Path) -> None:

@@ -96,6 +96,17 @@ def test_an_angle_is_followed_over_more_than_a_turn(low: float) -> None:
     np.testing.assert_allclose(np.delete(found, 7), np.delete(angle, 7), atol=1e-9)
 
 
+@pytest.mark.parametrize("neutral", [0.0, 90.0, 175.0, 270.0, 359.9, -180.0])
+@pytest.mark.parametrize("low", [0.0, -180.0])
+def test_an_encoder_is_followed_from_its_own_neutral(neutral: float, low: float) -> None:
+    """The map's offset takes the neutral off; nothing moves it by a turn."""
+    angle_deg = 30.0 * np.sin(np.arange(300) / 20.0) + 0.4
+    read = np.mod(angle_deg + neutral - low, 360.0) + low
+    channel = Channel(source="x", wraps_at=360.0, scale=0.5, offset=-0.5 * neutral)
+    found = channel.scale * signed(read, channel, "log", lambda row: row) + channel.offset
+    np.testing.assert_allclose(found, 0.5 * angle_deg, atol=1e-9)
+
+
 def test_whole_counts_that_cross_their_half_are_asked_about() -> None:
     angle = np.arange(0, 9000, 100)
     counts = np.mod(angle, 4096).astype(np.float64)

@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 from mcap.writer import Writer
 from nptdms import ChannelObject, TdmsWriter
+from scipy import io as scipy_io
 
 from coupled.errors import InputError
 from coupled.record.importing import separate
@@ -101,6 +102,47 @@ def test_a_map_is_proposed_that_has_every_sensor_by_its_clock(tmp_path: Path, na
     assert set(proposal.mapped) == {"column_force_N", "column_deflection_m"}
     stamps = {"a.mf4": "1.time", "a.tdms": "time"}.get(name, "/force.log_time")
     assert f'[clock]\nfrom = "{stamps}"\nunit = ' in proposal.text
+
+
+def write_structs(path: Path, columns: dict[str, dict[str, np.ndarray]]) -> None:
+    """Write vectors of two structs or groups, as of a model whose blocks log apart."""
+    if path.suffix == ".mat":
+        scipy_io.savemat(path, columns)
+        return
+    with h5py.File(path, "w") as file:
+        for struct, each in columns.items():
+            for name, values in each.items():
+                file[f"{struct}/{name}"] = values
+
+
+@pytest.mark.usefixtures("here")
+@pytest.mark.parametrize("name", ["a.mat", "a.h5"])
+@pytest.mark.parametrize(("late_s", "per_s"), [(0.5, 1.0), (0.0, 1.0), (0.5, 1000.0)])
+def test_a_struct_with_times_of_its_own_lies_where_they_say(
+    tmp_path: Path, name: str, late_s: float, per_s: float
+) -> None:
+    time_s = np.arange(600) / 60.0
+    load = {"time": per_s * (time_s + late_s), "value": np.sin(time_s + late_s)}
+    place = {"time": per_s * time_s, "value": np.cos(time_s)}
+    write_structs(tmp_path / name, {"load": load, "place": place})
+    unit = 'unit = "ms"' if per_s > 1.0 else ""
+    names = {"time": "place.time", "force": "load.value", "place": "place.value"}
+    record, account = read(tmp_path, name, TWO.format(unit=unit, **names))
+    assert len(record) == 600 - 60 * late_s
+    true_s = account.clock.start_s + record.time_s
+    np.testing.assert_allclose(record["column_force_N"] / N_PER_LBF, np.sin(true_s), atol=1e-9)
+    np.testing.assert_allclose(record["column_computed_m"] / 0.0254, np.cos(true_s), atol=1e-9)
+
+
+@pytest.mark.usefixtures("here")
+def test_dates_of_a_tdms_channel_have_their_unit(tmp_path: Path) -> None:
+    stamps = np.datetime64("2026-01-01T00:00:00") + np.arange(600) * np.timedelta64(20, "ms")
+    force = np.sin(np.arange(600) / 50.0)
+    with TdmsWriter(tmp_path / "a.tdms") as file:
+        file.write_segment([ChannelObject("g", "t", stamps), ChannelObject("g", "F", force)])
+    record, _ = read(tmp_path, "a.tdms", ONE.format(time="t", unit="", force="F"))
+    np.testing.assert_allclose(record.time_s, np.arange(600) / 50.0, atol=1e-9)
+    np.testing.assert_allclose(record["column_force_N"] / N_PER_LBF, force, atol=1e-12)
 
 
 @pytest.mark.usefixtures("here")

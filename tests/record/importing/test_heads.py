@@ -73,13 +73,14 @@ def test_a_csv_file_of_jsbsim_is_imported_without_a_map(
     assert list(record.manifest["inputs_sha256"]) == [next(tmp_path.glob("*.csv")).name]
 
 
-def test_the_row_before_jsbsims_trim_is_left_out(tmp_path: Path) -> None:
+@pytest.mark.parametrize("mark", [",", "\t", ";", " "])
+def test_the_row_before_jsbsims_trim_is_left_out(tmp_path: Path, mark: str) -> None:
     head = "Time,/fdm/jsbsim/attitude/theta-rad,/fdm/jsbsim/fcs/elevator-pos-rad"
     angles = [0.0, *(0.05 + 1e-4 * np.sin(0.3 * np.arange(59)))]
     for first, rows in ((0.0, 59), (0.05, 60)):
         angles[0] = first
         lines = [f"{i / 60.0:.6f},{angle:.9f},0.0{i}" for i, angle in enumerate(angles)]
-        (tmp_path / "log.csv").write_text("\n".join([head, *lines]) + "\n")
+        (tmp_path / "log.csv").write_text("\n".join([head, *lines]).replace(",", mark) + "\n")
         record, account = import_log(tmp_path / "log.csv")
         assert len(record) == rows
         left_out = "the first row is from before JSBSim's trim, and is left out"

@@ -64,6 +64,7 @@ def test_a_unit_of_another_dimension_is_refused(channel: str, name: str) -> None
         *[("kt", 0.514444444), ("km/h", 0.2777777778), ("ft/s", 0.3048), ("fpm", 0.00508)],
         *[("deg", 0.01745329252), ("[°/s]", 0.01745329252), ("m/s²", 1.0), ("m/s/s", 1.0)],
         *[("lbf/ft^2", 47.88025898), ("N/mm", 1000.0), ("lbf / deg", 254.8643249), ("%", 0.01)],
+        ("d", 86_400.0),
     ],
 )
 def test_units_have_their_published_factors(name: str, factor: float) -> None:
@@ -381,6 +382,33 @@ def test_figures_on_white_noise_raise_no_doubt() -> None:
         plausible.pressure_doubt(noise * 0 + 213.0, noise * 0 + 149.7, noise * 0 + 3000)
         == "looks like psf"
     )
+
+
+def test_a_sensor_that_saturates_on_both_sides_is_clipped() -> None:
+    noisy = np.sin(np.arange(2000) / 60.0) + 1e-3 * np.random.default_rng(1).standard_normal(2000)
+    assert plausible.clipped_at(np.clip(noisy, -0.8, 0.8)) == 0.8
+    assert plausible.clipped_at(np.clip(noisy, -0.8, 2.0)) == -0.8
+    assert plausible.clipped_at(noisy) is None
+
+
+@pytest.mark.parametrize("row", [0, 7, 599])
+def test_a_stale_or_torn_number_is_a_spike_at_either_end(tmp_path: Path, row: int) -> None:
+    force = -FORCE_N / 4.4482216152605
+    force[row] += 3.0
+    _, account = imported(tmp_path, text(force=force))
+    assert account.channels["column_force_N"].doubts == ("1 spike",)
+
+
+def test_a_fast_start_is_no_spike(tmp_path: Path) -> None:
+    force = -(FORCE_N[0] + 50.0 * np.sin(np.arange(ROWS) / 8.0)) / 4.4482216152605
+    _, account = imported(tmp_path, text(force=force))
+    assert not any("spike" in doubt for doubt in account.channels["column_force_N"].doubts)
+
+
+def test_a_line_may_end_in_more_delimiters_than_the_header(tmp_path: Path) -> None:
+    head, *rows = text().splitlines()
+    record, _ = imported(tmp_path, "\n".join([head, *(f"{line},," for line in rows)]))
+    np.testing.assert_allclose(record["column_force_N"], FORCE_N, rtol=1e-10)
 
 
 def test_an_evenly_sampled_log_needs_no_time_column(tmp_path: Path) -> None:

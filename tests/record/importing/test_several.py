@@ -6,6 +6,7 @@ from datetime import datetime, timedelta
 from pathlib import Path
 
 import numpy as np
+import polars as pl
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -17,6 +18,7 @@ from coupled.record.importing.mapping import Channel
 from coupled.record.record import Record
 from tests.support.commands import coupled
 from tests.support.logs import FORCE_N, GOOD, MAP, DEFLECTION_m, TIME_s, imported
+from tests.support.readhere import in_process
 
 ROWS = 300
 TWO = """
@@ -121,6 +123,9 @@ def test_a_further_logs_clock_may_be_another(tmp_path: Path) -> None:
         ("iso", "%H:%M:%S.%f"),
         ("%d.%m.%Y %H:%M:%S,%f", "%d.%m.%Y %H:%M:%S,%f"),
         ("%H-%M-%S.%f", "%H-%M-%S.%f"),
+        ("%I:%M:%S.%f", "%I:%M:%S.%f"),
+        ("%I:%M:%S.%f %p", "%I:%M:%S.%f %p"),
+        ("%M:%S.%f", "%M:%S.%f"),
     ],
 )
 def test_dates_and_times_of_day_run_on_past_midnight(tmp_path: Path, date: str, form: str) -> None:
@@ -133,6 +138,17 @@ def test_dates_and_times_of_day_run_on_past_midnight(tmp_path: Path, date: str, 
     log_map = MAP.replace('unit = "ms"', f'date = "{date}"')
     record, _ = imported(tmp_path, "T,F,D\n" + "\n".join(rows), log_map)
     np.testing.assert_allclose(record["column_force_N"], FORCE_N, rtol=1e-10)
+    np.testing.assert_array_equal(record.time_s, TIME_s)
+
+
+def test_times_of_day_of_a_table_run_on_past_midnight(tmp_path: Path) -> None:
+    start = datetime(2026, 2, 28, 23, 59, 57)
+    stamps = [(start + timedelta(seconds=float(t))).time() for t in TIME_s]
+    table = {"T": stamps, "F": -FORCE_N / 4.4482216152605, "D": DEFLECTION_m / 0.0254}
+    pl.DataFrame(table).write_parquet(tmp_path / "log.parquet")
+    (tmp_path / "map.toml").write_text(MAP.replace('unit = "ms"\n', "", 1))
+    with in_process():
+        record, _ = import_log(tmp_path / "log.parquet", tmp_path / "map.toml")
     np.testing.assert_array_equal(record.time_s, TIME_s)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -16,6 +16,7 @@ from coupled.errors import InputError
 
 Numbers = NDArray[np.float64] | NDArray[np.int64]
 MOST_COLUMNS = 20_000
+TIMES = ("time", "t", "timestamp")  # names of a struct's stamps
 WORDS = ("name", "unit", "group", "stamps", "refused")
 
 
@@ -83,6 +84,54 @@ def by_their_groups(columns: Sequence[Found]) -> list[Found]:
         )
         for column in columns
     ]
+
+
+def by_their_times(columns: Sequence[Found]) -> list[Found]:
+    """Return columns with the stamps of the struct or group that holds them, if stamps differ.
+
+    Those are its vector `time`, or that of the structs around it, of as many rows.
+    """
+    times: dict[str, Found] = {}
+    for column in columns:
+        struct, _, field = column.name.rpartition(".")
+        if field.casefold() in TIMES and np.all(np.diff(column.values) >= 0):
+            times.setdefault(struct, column)
+    owners = [_struct_with_time(column, times) for column in columns]
+    used = [times[struct].values for struct in times if struct in owners]
+    if all(np.array_equal(each, used[0]) for each in used):
+        return list(columns)
+    return [
+        replace(column, group=struct or "variables", stamps=times[struct].name)
+        if struct is not None
+        else column
+        for column, struct in zip(columns, owners, strict=True)
+    ]
+
+
+def _struct_with_time(column: Found, times: Mapping[str, Found]) -> str | None:
+    """Return the innermost struct around a column with times of as many rows, "" for the file."""
+    struct = column.name
+    while struct:
+        struct = struct.rpartition(".")[0]
+        if struct in times and times[struct].values.size == column.values.size > 0:
+            return struct
+    return None
+
+
+def named_apart(names: Sequence[str]) -> tuple[list[str], dict[str, tuple[str, ...]]]:
+    """Return unique names, and {duplicate name: its unique names}."""
+    times = Counter(names)
+    doubled: dict[str, list[str]] = {name: [] for name, count in times.items() if count > 1}
+    unique = []
+    for name in names:
+        own = name
+        if name in doubled:
+            own = f"{name}#{len(doubled[name]) + 1}"
+            while own in times:  # another column has this name
+                own = own.replace("#", "##", 1)
+            doubled[name].append(own)
+        unique.append(own)
+    return unique, {name: tuple(own) for name, own in doubled.items()}
 
 
 def pack(columns: Sequence[Found]) -> pl.DataFrame:

@@ -22,6 +22,7 @@ from coupled.record.importing.formats.columns import (
     Found,
     Numbers,
     as_numbers,
+    by_their_times,
     columns_of_matrix,
 )
 from coupled.record.importing.formats.objects import refused_object, replace_objects
@@ -55,7 +56,7 @@ def read_hdf5(path: Path, content: bytes, matrix: str, names: list[str] | str) -
         replace_objects(found, content, variables)
     if not found:
         raise InputError(path, "", "holds no vector of numbers")
-    return list(found.values())
+    return by_their_times(list(found.values()))
 
 
 def _own(group: Any, name: str) -> Any:

@@ -15,7 +15,11 @@ from scipy import io as scipy_io
 from scipy.io.matlab import MatlabOpaque, varmats_from_mat
 
 from coupled.errors import InputError
-from coupled.record.importing.formats.columns import Found, columns_of_matrix
+from coupled.record.importing.formats.columns import (
+    Found,
+    by_their_times,
+    columns_of_matrix,
+)
 from coupled.record.importing.formats.objects import refused_object, replace_objects
 
 DEEPEST = 6  # structs within structs
@@ -44,7 +48,7 @@ def read_matlab(path: Path, content: bytes, matrix: str, names: list[str] | str)
         found.update({name: Found(name, values) for name, values in columns.items()})
     if not found:
         raise InputError(path, "", "holds no vector of numbers")
-    return list(found.values())
+    return by_their_times(list(found.values()))
 
 
 def _load(path: Path, content: bytes) -> dict[str, Any]:

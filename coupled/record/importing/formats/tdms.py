@@ -35,9 +35,10 @@ def read_tdms(path: Path, content: bytes) -> list[Found]:
     clocks: dict[tuple[Any, ...], str] = {}
     for channel in channels[:MOST_COLUMNS]:
         notes: list[str] = []
+        own = ""
         with kept_warnings(notes):
             try:
-                values = _numbers(channel)
+                values, own = _numbers(channel)
             except (ValueError, LookupError, TypeError, ArithmeticError) as error:
                 values = np.zeros(0)
                 notes.append(f"its scale cannot be computed ({type(error).__name__})")
@@ -52,7 +53,7 @@ def read_tdms(path: Path, content: bytes) -> list[Found]:
             if clock not in clocks:
                 clocks[clock] = stamps
                 columns.append(Found(stamps, time_s, "s", _own(label, stamps), stamps))
-        unit = str(channel.properties.get("unit_string", "")).strip()[:40]
+        unit = own or str(channel.properties.get("unit_string", "")).strip()[:40]
         refused = f"npTDMS does not know what its numbers are: {notes[0]}" if notes else ""
         values = values[:0] if refused else values
         columns.append(Found(str(channel.name), values, unit, _own(label, stamps), stamps, refused))
@@ -81,8 +82,9 @@ def _waveform(channel: Any, rows: int, first: Any) -> np.ndarray[Any, Any] | Non
     return start_s + np.arange(rows) * float(step_s)
 
 
-def _numbers(channel: Any) -> Numbers | None:
+def _numbers(channel: Any) -> tuple[Numbers | None, str]:
+    """Return a channel's numbers, and their unit where its type gives it."""
     values = np.asarray(channel[:])
-    if values.dtype.kind == "M":  # of a clock: in ns since 1970
-        return values.astype("datetime64[ns]").astype(np.int64)
-    return as_numbers(values)
+    if values.dtype.kind == "M":  # of a clock: since 1970
+        return values.astype("datetime64[ns]").astype(np.int64), "ns"
+    return as_numbers(values), ""
