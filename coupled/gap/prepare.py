@@ -101,7 +101,7 @@ def prepare(
     left_out = [words for one in live for words in one.left_out]
     for file, record in records.items() if part.own else ():
         left_out += clipped(record, control, file)
-    if not rig.controls:
+    if any(output.stage == AIRFRAME for output in outputs):
         left_out += [words for words in [not_judged(list(records.values()))] if words]
     library = [one for one in library_of(rig, control) if part.frees(keys_of([one]))]
     if terms and part.airframe:
@@ -153,10 +153,10 @@ class Judged:
         readers = [replace(reader, rig=rig) for reader in self.readers]
         own = readers if self.part.own else []
         makers: list[Callable[[], list[Output]]] = [reader.outputs for reader in own]
-        slow, alike = not self.rig.controls, bool(self._known) and _has_same_flight(self.rig, rig)
+        alike = bool(self._known) and _has_same_flight(self.rig, rig)
         for one in readers if self.part.airframe and not alike else []:
             flights = self._flights.setdefault(one.number, Flights())
-            makers.append(partial(airframe_outputs, one.rig, one.record, one.number, flights, slow))
+            makers.append(partial(airframe_outputs, one.rig, one.record, one.number, flights))
         made = [output for each in in_threads(lambda make: make(), makers) for output in each]
         if alike:
             made += self._flown

@@ -97,7 +97,7 @@ def test_a_log_of_the_same_model_has_no_gap(healthy: Record) -> None:
 
 def test_the_lateral_motion_is_compared_if_aileron_and_rudder_are_recorded(healthy: Record) -> None:
     def compared(record: Record) -> set[str]:
-        return {output.channel for output in airframe_outputs(alone(), record, slow=True)}
+        return {output.channel for output in airframe_outputs(alone(), record)}
 
     assert {"roll_rate_rad_per_s", "sideslip_rad"} < compared(healthy)
     assert compared(without(healthy, "rudder_rad")) == {

@@ -9,12 +9,14 @@ from coupled.flight.aircraft import make_aircraft
 from coupled.flight.airframe import JSBSimAirframe
 from coupled.flight.conditions import Conditions, condition_wrappers
 from coupled.flight.weather import Wind
+from coupled.gap.chain import Part
 from coupled.gap.effects.effect import Effect, Parameter, Signature
+from coupled.gap.prepare import prepare
 from coupled.gap.search.case import Case
 from coupled.gap.search.problem import Problem
 from coupled.gap.signals.output import Output
 from coupled.gap.stages.airframe import airframe_outputs
-from coupled.gap.stages.shots import NEEDS, SLOW, not_judged
+from coupled.gap.stages.shots import NEEDS, SLOW
 from coupled.record.channels import motion_channels
 from coupled.record.record import Record
 from coupled.resources import aircraft_folder
@@ -78,7 +80,7 @@ def test_an_aircraft_put_into_its_own_state_flies_on(rig: Rig, wind_m_per_s: flo
 
 
 def test_a_healthy_record_leaves_noise_in_speed_and_attitude(rig: Rig, healthy: Record) -> None:
-    found = slow(airframe_outputs(rig, healthy, slow=True))
+    found = slow(airframe_outputs(rig, healthy))
     assert set(found) == set(SLOW)
     for output in found.values():
         assert 0.5 < output.gap(rig) < output.limit
@@ -88,7 +90,7 @@ def test_what_decelerates_shows_in_speed_and_attitude_alone(rig: Rig, healthy: R
     """0.1 m/s² less than the model has: 1 % of its weight, which no rate shows."""
     data = healthy.data.copy()
     data[:, healthy.channels.index(SLOW[0])] -= 0.1 * healthy.time_s
-    outputs = airframe_outputs(rig, Record(healthy.channels, data), slow=True)
+    outputs = airframe_outputs(rig, Record(healthy.channels, data))
     shown = {one.channel for one in outputs if one.gap(rig) > one.limit}
     assert SLOW[0] in shown <= set(SLOW)
 
@@ -98,7 +100,7 @@ def test_drag_is_judged_by_speed_and_attitude(
 ) -> None:
     real = rig.changed({"flight.drag": 1.3})
     record = made(tmp_path_factory.mktemp("drag"), real, {}, seed=3)
-    found = slow(airframe_outputs(rig, record, slow=True))
+    found = slow(airframe_outputs(rig, record))
     assert any(output.gap(rig) > output.limit for output in found.values())
     assert all(output.gap(real) < output.limit for output in found.values())
     drag = Effect("drag", "airframe", (DRAG,), Signature("", ""))
@@ -113,17 +115,17 @@ def test_a_record_without_a_state_says_what_is_not_judged(
 ) -> None:
     """What is judged by rates stays as it is."""
     record = without(healthy, name)
-    outputs = airframe_outputs(rig, record, slow=True)
+    outputs = airframe_outputs(rig, record)
     assert not slow(outputs)
-    before = {one.channel: one.gap(rig) for one in airframe_outputs(rig, healthy, slow=True)}
+    before = {one.channel: one.gap(rig) for one in airframe_outputs(rig, healthy)}
     for output in outputs:
         assert output.gap(rig) == pytest.approx(before[output.channel], rel=0.02)
     said = f"Without {name} speed and attitude are not judged, which show drag and thrust."
-    assert not_judged([record]) == said
+    assert prepare(rig, {"r": record}, Part("column")).left_out == (said,)
 
 
 def test_a_complete_record_says_nothing_of_the_kind(rig: Rig, healthy: Record) -> None:
-    assert not_judged([healthy]) == ""
+    assert prepare(rig, {"r": healthy}, Part("column")).left_out == ()
 
 
 def test_late_stamps_of_the_motion_delay_its_restarts_too(rig: Rig, healthy: Record) -> None:
@@ -133,6 +135,6 @@ def test_late_stamps_of_the_motion_delay_its_restarts_too(rig: Rig, healthy: Rec
         at = healthy.channels.index(name)
         data[3:, at] = data[:-3, at]
     late = rig.changed({"flight.motion_stamp_s": 3.0 / 120.0})
-    found = slow(airframe_outputs(rig, Record(healthy.channels, data), slow=True))
+    found = slow(airframe_outputs(rig, Record(healthy.channels, data)))
     assert found["pitch_rad"].gap(rig) > found["pitch_rad"].limit
     assert all(output.gap(late) < output.limit for output in found.values())

@@ -18,11 +18,16 @@ from coupled.gap.search.problem import Problem
 from coupled.gap.signals.output import Output, white
 from coupled.gap.stages.airframe import TRIM, airframe_outputs
 from coupled.gap.stages.openloop import Moved, about, command_of, fly_open_loop
+from coupled.gap.stages.shots import SLOW
 from coupled.gap.stages.surfaces import own_trim, surface_points
 from coupled.gap.stages.trim import WEIGHED, _constant, trim_of
 from coupled.record.channels import ELEVATOR
 from coupled.record.record import Record
+from coupled.resources import shipped_rigs
 from coupled.rig.rig import Rig
+from coupled.rig.rigfile import read_rig
+from tests.support import threecontrols
+from tests.support.airframes import noisy
 from tests.support.gaps import made, nominal_rig
 from tests.support.models import edited_model
 
@@ -48,6 +53,42 @@ def test_a_surface_moves_by_as_much_about_another_trim(trim: float, own: float) 
     assert np.interp(held + commands, *POINTS) == pytest.approx(own + change, abs=1e-12)
     assert commands[0] == pytest.approx(0.0, abs=1e-12)
     assert about(own, FILED, POINTS) == pytest.approx(held, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("own", "off"), [(0.102, 0.0), (0.098, 0.0), (0.11, 0.007), (0.09, -0.007)]
+)
+def test_a_trim_within_the_error_of_the_measured_one_is_that_of_the_record(
+    own: float, off: float
+) -> None:
+    """A surface is then flown where it was measured; else it moves by what is beyond the error."""
+    measured = 0.1 + np.array([0.0, 0.03, -0.06, 0.02])
+    surface = Moved("elevator_rad", measured, POINTS, 0.1, FILED, 0.003)
+    held = command_of(np.array([own]), POINTS)[0]
+    flown = np.interp(held + surface.commands(own), *POINTS)
+    assert flown == pytest.approx(measured + off, abs=1e-12)
+
+
+@pytest.mark.parametrize(("factor", "seed"), [(0.85, 3), (1.2, 4)])
+def test_the_right_aircraft_meets_the_motion_and_attitude_of_another_trim(
+    tmp_path: Path, rig: Rig, factor: float, seed: int
+) -> None:
+    """With floors of the filed rig. By the error of its trim, its attitude once was 3.8 off."""
+    record = made(tmp_path, rig, {"lift_slope": {"factor": factor}}, seed)
+    right = real(rig, "lift_slope", factor)
+    gaps = {out.channel: out.gap(right) for out in airframe_outputs(rig, record)}
+    assert {"pitch_rate_rad_per_s", *SLOW} <= gaps.keys()
+    assert max(gaps.values()) < 1.1
+
+
+def test_the_right_aircraft_meets_the_lateral_motion_of_another_trim() -> None:
+    """Its aileron and rudder trim elsewhere, too: its yaw rate once was 30 noise floors off."""
+    filed = noisy(read_rig(shipped_rigs()["c172p"]))
+    record = threecontrols.flown(filed, {"flight.drag": 1.3}, 12.0, pedals=160.0)
+    right = filed.changed({"flight.drag": 1.3})
+    gaps = {out.channel: out.gap(right) for out in airframe_outputs(filed, record)}
+    assert {"roll_rate_rad_per_s", "yaw_rate_rad_per_s", "sideslip_rad"} <= gaps.keys()
+    assert max(gaps.values()) < 1.2
 
 
 def test_a_model_in_its_own_trim_stays_there_by_surfaces_that_do_not_move(rig: Rig) -> None:

@@ -28,8 +28,8 @@ from coupled.gap.signals.floors import left_noise
 from coupled.gap.signals.output import Output, estimate_noise, spread, white
 from coupled.gap.stages.openloop import Between, Flown, Moved, flown_in, fly_open_loop
 from coupled.gap.stages.shots import SLOW, Restarts, States
-from coupled.gap.stages.surfaces import flown_by, moved, surface_channel, surface_points
-from coupled.gap.stages.trim import Trim, trim_of
+from coupled.gap.stages.surfaces import Trim, flown_by, moved, surface_channel, surface_points
+from coupled.gap.stages.trim import trim_of
 from coupled.gap.thresholds import FAR, KNOWN, SHOT_TRIES
 from coupled.record.channels import LATERAL, ControlName, channel, motion_channels
 from coupled.record.record import Record
@@ -174,7 +174,7 @@ def _digest(moved: Sequence[Moved]) -> bytes:
     """Return a hash of the surfaces' motion."""
     found = sha256()
     for one in moved:
-        found.update(repr((one.channel, one.trim, one.filed)).encode())
+        found.update(repr((one.channel, one.trim, one.filed, one.unsure)).encode())
         for values in (one.values, *(one.points or ())):
             found.update(values.tobytes())
     return found.digest()
@@ -204,13 +204,10 @@ def airframe_outputs(
     record: Record,
     number: int = 0,
     flights: Flights | None = None,
-    slow: bool = False,
 ) -> list[Output]:
     """Return the airframe's outputs; empty for a bench, or if channels are missing.
 
-    `flights` is a cache of flights of the same record. With `slow`, speed and pitch attitude are
-    outputs, too. A diagnosis has them for an aircraft alone only: with another lift slope, the
-    attitude of the right rig was off by 2.5 noise floors, which drew in effects that are not there.
+    `flights` is a cache of flights of the same record.
     """
     if rig.flight is None or any(name not in record for name in needs(rig, record)):
         return []
@@ -220,11 +217,10 @@ def airframe_outputs(
     compared = tuple(name for name in wanted if np.ptp(record[name]) > 0.0)
     each = {control: trim_of(rig, record, control) for control in flown_by(rig)}
     trims = {control: trim for control, trim in each.items() if trim is not None}
-    places = {control: (trim.position, trim.jump) for control, trim in trims.items()}
-    right, wrong = moved(rig, record, places, np.random.default_rng(43))
+    right, wrong = moved(rig, record, trims, np.random.default_rng(43))
     air = vertical_air(record, 1.0 / rig.frame_rate)
     known = Flights() if flights is None else flights
-    restarts = Restarts.of(record, rig.frame_rate) if slow else None
+    restarts = Restarts.of(record, rig.frame_rate)
     model = Model(rig, record, right, compared, air, known, restarts)
     flown = model.flown(rig)
     assert flown is not None  # the filed rig can be trimmed

@@ -241,7 +241,7 @@ class Series:
         if not reading.begins_moved:
             return None
         bend = rig.controls[reading.control].loader.bend
-        place = self._grip - reading.sensed(rig).zero - bend * bending
+        place = reading.sensed(rig).from_grip(self._grip) - bend * bending
         return np.arange(len(place)) == 0, place, rate_of(place, rig.frame_rate)
 
     def _predicted(self, force: Floats, times: float) -> Predict:

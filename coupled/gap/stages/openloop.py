@@ -2,11 +2,15 @@
 
 An aircraft with another weight, lift or moment trims at other surface positions. The record gives
 its surface positions in trim (`trim`). The surfaces' deflections from there are added to the
-model's own trim, so that the model does not start with a transient from one trim to the other.
+model's own trim, so that the model does not start with a transient from one trim to the other. A
+measured trim has an error, which would act on a model as a constant deflection, and its attitude
+would drift. If the model's own trim is within that error, the record's trim is therefore taken to
+be the model's own.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from threading import Lock
@@ -60,8 +64,9 @@ class Moved:
     """The motion of one control's surface over a record.
 
     `channel` is its name. With a map from command to position (`points`), `values` are positions
-    in rad, `trim` is the position in trim, and `filed` that in trim of the map's model. Otherwise
-    `values` are commands about trim. Row k is the input of the motion in row k.
+    in rad, `trim` is the measured position in trim with the largest error `unsure`, and `filed` is
+    the position in trim of the map's model. Otherwise `values` are commands about trim. Row k is
+    the input of the motion in row k.
     """
 
     channel: str
@@ -69,12 +74,15 @@ class Moved:
     points: Points | None = None
     trim: float = 0.0
     filed: float = 0.0
+    unsure: float = 0.0
 
     def commands(self, own: float) -> Floats:
         """Return the commands about the trim of a model whose surface trims at `own`."""
         if self.points is None:
             return self.values
-        moved = own - self.trim if abs(own - self.trim) > SAME_TRIM_rad else 0.0
+        off = own - self.trim
+        beyond = max(abs(off) - self.unsure, 0.0)
+        moved = math.copysign(beyond, off) if beyond > SAME_TRIM_rad else 0.0
         return command_of(self.values + moved, self.points) - about(own, self.filed, self.points)
 
 

@@ -9,6 +9,7 @@ stage is not judged.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -22,7 +23,14 @@ from coupled.gap.signals.conditions import trim_shift
 from coupled.gap.signals.floors import left_noise
 from coupled.gap.signals.output import estimate_noise
 from coupled.gap.stages.openloop import Moved, Points, about
-from coupled.gap.thresholds import KNOWN, MOST, SMALL, BRIEF_s, SURFACE_GUST_m_per_s
+from coupled.gap.thresholds import (
+    KNOWN,
+    MOST,
+    SMALL,
+    TRIM_SIGMAS,
+    BRIEF_s,
+    SURFACE_GUST_m_per_s,
+)
 from coupled.record.channels import (
     CONTROL_NAMES,
     SURFACES,
@@ -40,6 +48,19 @@ from coupled.rig.serving import service_rows
 from coupled.schema import changed
 
 Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Trim:
+    """A surface's position in trim, rad: the origin of its motion, and the measurement.
+
+    `error` is the standard error of `measured`; `jump` the surface's offset from the second row on.
+    """
+
+    position: float
+    measured: float
+    error: float
+    jump: float = 0.0
 
 
 def surface_channel(control: ControlName) -> str:
@@ -130,14 +151,13 @@ def _trim(flight: str, controls: tuple[ControlName, ...], rate_Hz: float) -> tup
 def moved(
     rig: Rig,
     record: Record,
-    trims: Mapping[ControlName, tuple[float, float]],
+    trims: Mapping[ControlName, Trim],
     rng: np.random.Generator,
 ) -> tuple[list[Moved], list[Moved]]:
     """Return the motion of the surfaces, and the same with a sample of its error.
 
-    In the order of `flown_by`. `trims` are the positions in trim, rad, and the jumps from
-    there after the first row, which are not smoothed. A control without any channel in the record
-    is taken as not moved.
+    In the order of `flown_by`. `trims` are those of the record; a jump is not smoothed. A control
+    without any channel in the record is taken as not moved.
     """
     found = list[Moved]()
     wrong = list[Moved]()
@@ -148,13 +168,14 @@ def moved(
             found, wrong = [*found, one], [*wrong, one]
             continue
         position, filed = record[name], filed_trim(rig, control)
-        trim, jump = trims.get(control, (filed, 0.0))
+        trim = trims.get(control, Trim(filed, filed, 0.0))
+        given = (points, trim.measured, filed, TRIM_SIGMAS * trim.error)
         if VALIDITY in record:  # the surface of a live flight is the model's: no noise
-            one = Moved(name, position, points, trim, filed)
+            one = Moved(name, position, *given)
             found, wrong = [*found, one], [*wrong, one]
             continue
-        step = np.where(np.arange(len(position)) > 0, jump, 0.0)
-        left = position - _led(rig, record, control, trim)
+        step = np.where(np.arange(len(position)) > 0, trim.jump, 0.0)
+        left = position - _led(rig, record, control, trim.position)
         level = left_noise(estimate_noise(position), position, left)
         if float(np.std(left)) < MOST * estimate_noise(position).rms:
             # The command explains its roughness, so that is motion of the surface, not noise.
@@ -163,8 +184,8 @@ def moved(
         else:
             smooth = smoothed(position - step) + step
             error = Smoother.of(position - step).wiener_error(level, len(smooth), rng)
-        found.append(Moved(name, smooth, points, trim, filed))
-        wrong.append(Moved(name, smooth + error, points, trim, filed))
+        found.append(Moved(name, smooth, *given))
+        wrong.append(Moved(name, smooth + error, *given))
     return found, wrong
 
 

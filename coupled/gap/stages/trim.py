@@ -14,7 +14,6 @@ it discriminates lift, moment and weight.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.polynomial import Polynomial
@@ -25,6 +24,7 @@ from coupled.gap.signals.conditions import trim_shift
 from coupled.gap.signals.output import estimate_noise, memory, white
 from coupled.gap.stages.openloop import about, flown_in, fly_open_loop
 from coupled.gap.stages.surfaces import (
+    Trim,
     filed_trim,
     flown_by,
     moved,
@@ -50,19 +50,7 @@ from coupled.rig.serving import service_rows
 
 Floats = NDArray[np.float64]
 WEIGHED = ("pitch_rate_rad_per_s", "alpha_rad", "load_factor")
-
-
-@dataclass(frozen=True)
-class Trim:
-    """A surface's position in trim, rad: the origin of its motion, and the measurement.
-
-    `error` is the standard error of `measured`; `jump` the surface's offset from the second row on.
-    """
-
-    position: float
-    measured: float
-    error: float
-    jump: float = 0.0
+_LATERAL = ("roll_rate_rad_per_s", "yaw_rate_rad_per_s", "sideslip_rad")
 
 
 def trim_of(rig: Rig, record: Record, control: ControlName) -> Trim | None:
@@ -81,7 +69,7 @@ def trim_of(rig: Rig, record: Record, control: ControlName) -> Trim | None:
         return Trim(own, own + standing, error)
     there = own + standing
     evidence = ((first - own) ** 2 - (first - there) ** 2) / max(noise, 1e-12) ** 2
-    flown = _followed(rig, record, control, own, there) if control == "column" else None
+    flown = _followed(rig, record, control, own, there)
     in_trim = evidence > RIVAL_GAIN if flown is None else evidence + flown > -RIVAL_GAIN
     return Trim(there, there, error) if in_trim else Trim(own, own, noise, standing)
 
@@ -166,12 +154,13 @@ def _followed(
     """
     rows = min(len(record), round(FLIGHT_s * rig.frame_rate))
     short = Record(record.channels, record.data[:rows], record.manifest)
-    names = [name for name in WEIGHED if name in record]
+    weighed = WEIGHED if control == "column" else _LATERAL
+    names = [name for name in weighed if name in record]
     if not names or rig.flight is None:
         return None
     lefts = []
-    for trim, jump in ((own, there - own), (there, 0.0)):
-        surfaces, _ = moved(rig, short, {control: (trim, jump)}, np.random.default_rng(43))
+    for trim in (Trim(own, own, 0.0, there - own), Trim(there, there, 0.0)):
+        surfaces, _ = moved(rig, short, {control: trim}, np.random.default_rng(43))
         given = (rig.flight, rig.frame_rate, flown_by(rig), surfaces, names, None)
         flown = fly_open_loop(*given, flown_in(short, flown_by(rig), rig.frame_rate))
         left = np.column_stack([short[n] - flown.motion[:, i] for i, n in enumerate(names)])
