@@ -183,7 +183,7 @@ def findings(prepared: Prepared, case: Case, choice: Choice) -> PartDiagnosis:
         trim=prepared.trim,
         filtered={name: one for each in filtered for name, one in each},
         left_out=prepared.left_out,
-        inseparable=inseparable(choice.fit),
+        inseparable=inseparable(choice.fit, control),
         curved=curves,
     )
 

@@ -25,7 +25,20 @@ def test_two_numbers_with_nearly_one_signature_are_one(apart: float, together: b
 
     output = Output("loader", "x", 5.0 * FIRST + NOISE, predict, 1.0, 120.0)
     problem = Problem(Case(bench(), "column", [output]))
-    found = inseparable(problem.fit((OFFSET, WEIGHT)))
+    found = inseparable(problem.fit((OFFSET, WEIGHT)), "column")
     keys = ("force_offset.offset_N", "bob_weight.force_N_per_g")
     assert [one.keys for one in found] == ([keys] if together else [])
-    assert inseparable(problem.fit((OFFSET,))) == ()
+    assert inseparable(problem.fit((OFFSET,)), "column") == ()
+
+
+def test_a_number_has_the_unit_of_its_control() -> None:
+    """A length is in m on a column."""
+
+    def predict(rig: Rig) -> Floats:
+        loader = rig.controls["column"].loader
+        return np.asarray((loader.offset + 1e-3 * loader.cubic) * FIRST)
+
+    output = Output("loader", "x", 5.0 * FIRST + NOISE, predict, 1.0, 120.0)
+    effects = (OFFSET, BY_NAME["cubic_stiffness"])
+    (one,) = inseparable(Problem(Case(bench(), "column", [output])).fit(effects), "column")
+    assert one.keys == ("force_offset.offset_N", "cubic_stiffness.cubic_N_per_m3")

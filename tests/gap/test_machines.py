@@ -12,7 +12,15 @@ from coupled.gap.diagnose import diagnose
 from coupled.gap.signals.floors import floor_from
 from coupled.gap.signals.reading import worth_recording
 from tests.support.gaps import nominal_rig
-from tests.support.machines import CUBIC, DAMPING, duffing, duffing_rig
+from tests.support.machines import (
+    CUBIC,
+    DAMPING,
+    MOTOR_DRY_N,
+    duffing,
+    duffing_rig,
+    motor,
+    motor_rig,
+)
 
 
 def test_a_floor_that_hides_a_gap_lets_no_one_say_that_there_is_none() -> None:
@@ -51,6 +59,20 @@ def test_a_hardening_spring_and_a_damping_are_found_under_a_broadband_force(to_H
     assert [effect.name for effect in damping.effects] == ["viscous_damping"]
     assert damping.effects[0].value == pytest.approx(1.0 / 0.7, rel=0.02)
     assert damping.verdict == spring.verdict == "effect"
+
+
+@pytest.mark.slow
+def test_a_wrong_scale_does_not_stand_for_damping_and_friction_together() -> None:
+    """A scale of the force alone takes nearly all of the gap. One way, friction is an offset."""
+    found = diagnose(motor_rig(), {"r": motor()})
+    known = {effect.name: effect for effect in found.effects}
+    assert known["viscous_damping"].value == pytest.approx(2.0, rel=0.05)
+    assert known["viscous_damping"].probability >= 0.6
+    assert len(known) == 2
+    (other,) = known.keys() - {"viscous_damping"}
+    assert other in ("force_offset", "force_zero", "coulomb_friction", "breakout")
+    assert abs(known[other].value) == pytest.approx(MOTOR_DRY_N, rel=0.05)
+    assert known[other].probability < 0.5
 
 
 def test_only_what_the_machine_has_is_worth_recording() -> None:

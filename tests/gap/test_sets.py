@@ -14,13 +14,14 @@ from numpy.typing import NDArray
 
 from coupled.gap.effects.effect import Effect
 from coupled.gap.effects.library import BY_NAME, EFFECTS
-from coupled.gap.search.beam import search_sets
+from coupled.gap.search.beam import Beam, search_sets
 from coupled.gap.search.case import Case
 from coupled.gap.search.found import Choice
+from coupled.gap.search.problem import Problem
 from coupled.gap.signals.output import Output
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points
-from coupled.gap.thresholds import RIVAL_GAIN
+from coupled.gap.thresholds import RIVAL_GAIN, VERY_STRONG
 from coupled.rig.rig import Rig
 from tests.support.gaps import made, nominal_rig
 from tests.support.rigs import bench
@@ -114,6 +115,48 @@ def test_a_second_effect_is_named_where_it_explains_what_the_first_leaves(
     assert names(choice) == expected
     offset = choice.fit.values[OFFSET.value_key(OFFSET.free[0])]
     assert offset == pytest.approx(30.0, rel=0.01)
+
+
+def test_an_effect_whose_place_another_takes_is_found_beside_it() -> None:
+    """The weight alone takes most of the residual; the rest is hardly like the offset's."""
+
+    def predict(rig: Rig) -> Floats:
+        loader = rig.controls["column"].loader
+        weight = loader.bob_weight * (FIRST + 0.045 * SECOND)
+        return np.asarray(10.0 * (loader.offset * FIRST + weight))
+
+    keys = {"offset_N": -38.0, "bob_weight_N_per_g": 40.0}
+    real = bench().changed({f"controls.column.loader.{key}": v for key, v in keys.items()})
+    choice = found([output(predict(real) + NOISE, predict)], [OFFSET, WEIGHT])
+    assert names(choice) == {"force_offset", "bob_weight"}
+    assert choice.fit.values[OFFSET.value_key(OFFSET.free[0])] == pytest.approx(-38.0, rel=0.02)
+
+
+@pytest.mark.parametrize("beside", [False, True])
+def test_what_gained_is_listed_where_nothing_else_did(beside: bool) -> None:
+    """The interval of a size contains zero, and the evidence is not very strong."""
+
+    def predict(rig: Rig) -> Floats:
+        loader = rig.controls["column"].loader
+        return np.asarray(0.1 * (loader.offset * FIRST + loader.bob_weight * SECOND))
+
+    real = bench().changed({"controls.column.loader.offset_N": 0.7})
+    problem = Problem(Case(bench(), "column", [output(predict(real) + NOISE, predict)]))
+    root, fitted = problem.fit(()), problem.fit((OFFSET,))
+    wide = replace(fitted, low={**fitted.low, OFFSET.value_key(OFFSET.free[0]): -1.0})
+    beam = Beam(problem, root, problem.variances(root.rig))
+    for one in (root, wide):
+        beam.add(one)
+    beam.recount()
+    name = frozenset({"force_offset"})
+    assert 0.0 < beam.log(name) - beam.log(frozenset()) < VERY_STRONG
+    if beside:
+        weight = problem.fit((WEIGHT,), {"bob_weight.force_N_per_g": 1.0})
+        better = replace(beam.known[name], rest=beam.known[name].rest + 1.0)
+        sure = replace(weight, low={"bob_weight.force_N_per_g": 0.5})
+        beam.fits[frozenset({"bob_weight"})] = sure
+        beam.known[frozenset({"bob_weight"})] = better
+    assert (name in beam.valid()) is not beside
 
 
 def test_two_slow_effects_are_found_together() -> None:

@@ -14,7 +14,7 @@ from coupled.gap.findings.result import (
     StageResult,
     Verdict,
 )
-from coupled.gap.findings.summary import in_time, summary
+from coupled.gap.findings.summary import closes, in_time, summary
 from coupled.gap.search.course import Bounds, Course
 
 FRICTION = EffectResult(
@@ -61,6 +61,62 @@ def test_what_remains_is_noise_only_within_the_limit_of_noise(left: float, noise
     text = said("effect", left, 0.999, replace(FRICTION, probability=0.9))
     assert ("what remains is noise" in text) is noise
     assert ("7.8 floors" in text) is not noise
+
+
+@pytest.mark.parametrize(
+    ("low", "stretches", "ends"),
+    [(0.7, 2, "too few stretches for an interval"), (0.5, 2, "50 to 70 %"), (0.7, 9, "70 to 70 %")],
+)
+def test_one_stretch_is_no_interval(low: float, stretches: int, ends: str) -> None:
+    channel = ChannelShrink("x_m", 1.0, 0.37, 0.1, stretches, 0.7, low, 0.7, stretches > 8)
+    assert ends in closes(Shrink(channel, ()))
+
+
+OFFSET = replace(
+    FRICTION, name="force_offset", parameters=(replace(FRICTION.parameters[0], unit="Nm"),)
+)
+
+
+def text_of(budget: StageBudget, *effects: EffectResult, stage: StageResult = LOADER) -> str:
+    found = Findings("column", "mostly", (stage,), effects, (), (), (budget,))
+    shrink = Shrink(ChannelShrink("column_computed_m", 1.0, 0.1, 0.1, 4), ())
+    return summary(found, shrink, "", "", "")
+
+
+def test_an_effect_that_acts_only_beside_another_has_no_share_of_its_own() -> None:
+    """Shapley's share of one may be negative, and that of the other over 100 %."""
+    shares = (share("coulomb_friction", 1.08), share("force_offset", -0.18))
+    budget = StageBudget("loader", shares, share("unexplained", 0.1), share("noise", 0.0))
+    text = text_of(budget, replace(FRICTION, probability=0.9), OFFSET)
+    assert text.startswith("Coulomb friction, 0 → 4 N (+4) with force offset, 0 → 4 Nm (+4),")
+    assert "explains 90 % of the loader's gap" in text
+    assert "-18" not in text
+
+
+def test_a_number_is_set_only_where_its_effect_is_credible() -> None:
+    shares = (share("coulomb_friction", 0.8), share("force_offset", 0.1))
+    budget = StageBudget("loader", shares, share("unexplained", 0.1), share("noise", 0.0))
+    text = text_of(budget, replace(FRICTION, probability=0.9), OFFSET)
+    assert text.count("Set ") == 1
+    assert "Probabilities: coulomb friction 0.90, force offset 0.30." in text
+
+
+@pytest.mark.parametrize("shown_in", [("loader",), ()])
+def test_a_stage_without_a_residual_of_its_own_is_not_said_to_leave_noise(
+    shown_in: tuple[str, ...],
+) -> None:
+    """It shows in the loader, whose sentence has the same effects."""
+    scale = replace(FRICTION, name="force_scale", stage="sensing", probability=0.9)
+    sensing = StageResult("sensing", 10.0, guilty=True, shown_in=shown_in)
+    shares = (share("force_scale", 0.8),)
+    rest, noise = share("unexplained", 0.2), share("noise", 0.0)
+    budgets = tuple(StageBudget(n, shares, rest, noise) for n in ("loader", "sensing"))
+    stages = (replace(LOADER, left=1.1), sensing)
+    found = Findings("column", "mostly", stages, (scale,), (), (), budgets)
+    shrink = Shrink(ChannelShrink("column_computed_m", 1.0, 0.1, 0.1, 4), ())
+    text = summary(found, shrink, "", "", "")
+    assert ("of the sensing's gap; 20 % remains." in text) is not bool(shown_in)
+    assert "sensing's gap; what remains is noise" not in text
 
 
 @pytest.mark.parametrize(

@@ -1,15 +1,22 @@
-"""An effect whose interval contains its neutral value is not certain."""
+"""Intervals that contain the neutral value, and numbers at a bound."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from coupled.gap.effects.effect import Effect
 from coupled.gap.effects.library import BY_NAME
-from coupled.gap.findings.answer import has_size
+from coupled.gap.findings.answer import effects_of, has_size
 from coupled.gap.findings.result import ParameterEstimate
 from coupled.gap.search.case import Case
+from coupled.gap.search.fit import fit_alone
+from coupled.gap.search.found import Choice, Fit, Found
+from coupled.gap.signals.output import Output
+from coupled.gap.thresholds import CERTAIN, UNDERSTATED
+from coupled.rig.rig import Rig
 from tests.support.rigs import bench
 
 NUMBER = ParameterEstimate("x", 1.0, 0.5, 1.5, "loader.x", "N", 0.0, 1.0, 0.5, 1.5, "", False)
@@ -33,3 +40,39 @@ def test_an_effect_has_a_size_where_an_interval_excludes_the_neutral_value(
     case, effect = Case(bench(), "column", []), BY_NAME[name]
     numbers = [replace(NUMBER, low=low, high=high) for low, high in intervals]
     assert has_size(effect, case, numbers) == sized
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "half", "low"),
+    [
+        ("force_scale", 0.8, 2.0, 0.0),
+        ("coulomb_friction", 1.0, 3.0, 0.0),
+        ("force_offset", 1.0, 3.0, -2.0),
+    ],
+)
+def test_the_interval_of_what_cannot_be_negative_ends_at_zero(
+    name: str, value: float, half: float, low: float
+) -> None:
+    effect = BY_NAME[name]
+    (key,) = (effect.value_key(p) for p in effect.free)
+    ends = ({key: value - half / UNDERSTATED}, {key: value + half / UNDERSTATED})
+    rig = bench()
+    fit = Fit((effect,), {key: value}, *ends, (), rig, 0.0)
+    choice = Choice((Found(effect, 10.0, 0.9, ()),), fit, replace(fit, effects=()))
+    (found,) = effects_of(Case(rig, "column", []), choice, [], [])
+    assert found.parameters[0].low == pytest.approx(low)
+    assert found.parameters[0].high == pytest.approx(value + half)
+    assert found.probability < CERTAIN
+
+
+def test_a_number_that_ends_at_a_bound_is_the_bound() -> None:
+    """A descent ends 1e-9 of the scale beside it, which no one wants to read or to set."""
+    shape = np.random.default_rng(4).normal(size=600)
+    effect: Effect = BY_NAME["breakout"]
+
+    def predict(rig: Rig) -> np.ndarray:
+        return np.asarray(rig.controls["column"].loader.breakout * shape)
+
+    output = Output("loader", "x", -shape, predict, 0.1, 120.0)
+    fit = fit_alone(bench(), "column", [output], [effect])
+    assert [*fit.values.values()] == [0.0]

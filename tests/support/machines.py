@@ -261,3 +261,30 @@ def sprung(
 def sprung_rig(rate_Hz: float = 100.0) -> Rig:
     """Return the rig of that mass, without friction."""
     return plain_rig(rate_Hz, {"mass_kg": 2.0, "damping_N_s_per_m": 40.0}, 1000.0)
+
+
+MOTOR_kg, MOTOR_DAMPING, MOTOR_DRY_N = 1.2e-4, 1.4e-4, 0.03
+
+
+def motor(seed: int = 1, seconds: float = 20.0, rate_Hz: float = 50.0) -> Record:
+    """Return a record of a motor that turns one way, under two levels of torque.
+
+    m·x'' + c·x' = F − R while it turns, in closed form. A torque is a force at a radius of 1 m.
+    """
+    rng = np.random.default_rng(seed)
+    times = np.arange(round(seconds * rate_Hz)) / rate_Hz
+    late, slow = np.clip(times - 0.5 * seconds, 0.0, None), MOTOR_kg / MOTOR_DAMPING
+
+    def turned(net_N: float, since: Floats) -> Floats:
+        return np.asarray(net_N / MOTOR_DAMPING * (since + slow * np.expm1(-since / slow)))
+
+    way = turned(0.05 - MOTOR_DRY_N, times) + turned(0.01, late)
+    way += 0.01 * rng.normal(size=len(times))
+    return recorded(rate_Hz, force_N=np.where(late > 0.0, 0.06, 0.05), computed_m=way)
+
+
+def motor_rig() -> Rig:
+    """Return its rig, with half of the damping and no friction."""
+    filed = {"mass_kg": MOTOR_kg, "damping_N_s_per_m": 0.5 * MOTOR_DAMPING}
+    rig = plain_rig(50.0, filed | {"servo_frequency_Hz": 1000.0})
+    return rig.changed({"controls.column.travel_m": 1e5, LENGTH: 1e5})

@@ -125,6 +125,15 @@ def _what(found: Findings, floor: str) -> str:
     budgets = {one.stage: one for one in found.budget}
     stages = [found.stage(name) for name in found.guilty]
     acting = {stage.name: _acting(found, stage, budgets.get(stage.name)) for stage in stages}
+    # A stage that only others show, by the same effects, has nothing more to say.
+    by_others = [
+        stage
+        for stage in stages
+        if stage.left is None
+        and acting[stage.name]
+        and any({*acting[stage.name]} <= {*acting.get(n, ())} for n in stage.shown_in)
+    ]
+    stages = [stage for stage in stages if stage not in by_others]
     if not any(acting.values()) and found.verdict == "unexplained":
         return f"A gap in the {', '.join(found.guilty)} that no effect of the library explains."
     return " ".join(
@@ -156,15 +165,22 @@ def _explained(
         return (
             f"No effect of the library explains the {stage.name}'s gap of {stage.gap:.3g} floors."
         )
-    shares = [
-        f"{_effect(e)}{',' if e.parameters else ''} explains {_per_cent(budget.of(e.name))}"
-        for e in acting
-    ]
+    # The share of an effect that only acts beside others counts with the largest one.
+    main = max(acting, key=lambda e: budget.of(e.name))
+    beside = [e for e in acting if e is not main and budget.of(e.name) < 0.0]
+    shares = []
+    for effect in (e for e in acting if e not in beside):
+        one = [effect, *beside] if effect is main else [effect]
+        share = _per_cent(sum(budget.of(e.name) for e in one))
+        words = " with ".join(_effect(e) for e in one)
+        shares.append(f"{words}{',' if one[-1].parameters else ''} explains {share}")
     said = f"{capital(' and '.join(shares))} of the {stage.name}'s gap"
     over = stage.left is not None and stage.limit is not None and stage.left > stage.limit
     if over and not stage.unexplained:
         left = f"{_per_cent(budget.remains)} remains, {stage.left:.3g} floors"
         return f"{said}; {left}, as the error of an effect's own physics may leave."
+    if stage.left is None and budget.remains >= MINOR:
+        return f"{said}; {_per_cent(budget.remains)} remains."
     if not stage.unexplained or stage.remains is None:
         return f"{said}; what remains is {floor}."
     near = stage.remains.reversals
@@ -185,15 +201,17 @@ def capital(text: str) -> str:
 
 
 def _set(found: Findings) -> str:
-    """Return which values to set in host and rig file."""
+    """Return which values to set in host and rig file; of no effect that is not credible."""
     if found.verdict not in ("effect", "mostly"):
         return ""
-    numbers = [p for effect in found.effects for p in effect.parameters if not _is_none(p)]
+    open_ones = {name for group in found.rivals for name in group}
+    known = [e for e in found.effects if e.probability >= CERTAIN or e.name in open_ones]
+    numbers = [p for effect in known for p in effect.parameters if not _is_none(p)]
     keys = [p.host or f"{dotted(p.key, found.control)} in the rig file" for p in numbers]
     said = [f"Set {key} to {_found(p)}." for key, p in zip(keys, numbers, strict=True)]
     switches = [
         p
-        for one in found.effects
+        for one in known
         if one.name in BY_NAME
         for p in BY_NAME[one.name].parameters
         if isinstance(p, Switch)
@@ -324,7 +342,10 @@ def _sure(found: Findings) -> str:
         if most < CERTAIN:
             return f"No effect is certain: their probability is {most:.2f} at most."
         return "The effects that are certain hold less than half of the gap."
-    return f"Probability {min(effect.probability for effect in found.effects):.2f}."
+    each = {plain(effect.name): f"{effect.probability:.2f}" for effect in found.effects}
+    if len({*each.values()}) > 1:
+        return f"Probabilities: {', '.join(f'{name} {p}' for name, p in each.items())}."
+    return f"Probability {min(each.values())}."
 
 
 def closes(shrink: Shrink) -> str:
@@ -333,8 +354,9 @@ def closes(shrink: Shrink) -> str:
     if most.closed is None or most.low is None or most.high is None:
         return ""
     few = "" if most.reliable else ", from too few stretches to rely on"
-    ends = f"{round(100 * most.low)} to {round(100 * most.high)} %{few}"
-    if few and most.low <= 0.0:  # some stretches hold no gap to close
+    low, high = round(100 * most.low), round(100 * most.high)
+    ends = f"{low} to {high} %{few}"
+    if few and (most.low <= 0.0 or low == high):  # some hold no gap to close, or there is but one
         ends = "from too few stretches for an interval"
     return f"It closes {100 * most.closed:.0f} % of the gap on held-out data ({ends})."
 

@@ -117,12 +117,21 @@ class Beam:
         return self.known[names].log(self.counts)
 
     def valid(self) -> list[Names]:
-        """Return the admissible sets (`is_admissible`), those of fewest parameters first."""
+        """Return the admissible sets (`is_admissible`), those of fewest parameters first.
+
+        If no admissible set has more evidence than no effect, sets are admissible although the
+        interval of a size contains the neutral value, if they have.
+        """
         valid = list[Names]()
         for names in sorted(self.fits, key=lambda one: _numbers(self.fits[one])):
             fitted = self.fits[names]
             if not names or is_admissible(self.problem, fitted, self._needed(fitted, valid)):
                 valid.append(names)
+        if not len(self.counts):
+            return valid
+        gained = [n for n in self.fits if n and self.log(n) > self.log(frozenset())]
+        if not any(names in gained for names in valid):
+            valid += [n for n in gained if is_admissible(self.problem, self.fits[n], n)]
         return valid
 
     def _needed(self, fitted: Fit, valid: Sequence[Names]) -> Names:

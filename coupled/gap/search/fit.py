@@ -35,7 +35,7 @@ from coupled.gap.search.descent import WHOLE, Descent, End, Slope
 from coupled.gap.search.found import Fit, Group
 from coupled.gap.search.intervals import cost_of_unit_likelihood, half_width, least_of, open_above
 from coupled.gap.signals.output import Output, Part, memory
-from coupled.gap.thresholds import DOUBLED, FAR, ROUNDS
+from coupled.gap.thresholds import DOUBLED, FAR, ROUNDS, TINY
 from coupled.parallel import go_on
 from coupled.record.channels import ControlName
 from coupled.rig.rig import Rig
@@ -281,7 +281,10 @@ def _group(
     half = half_width(best, outputs, stretches, prior.precision) * scale
     # A lower bound at which nothing is left of the filed value is a valid result, not a bound.
     gone = np.isclose(best.x, low, atol=1e-4) & (free.ends[0] < [p.low for p in free.numbers])
-    values = np.where(gone, free.ends[0], best.x * scale)
+    values = best.x * scale
+    for end, bound in zip((low, high), free.ends, strict=True):  # the descent ends just beside it
+        values = np.where(np.isclose(best.x, end, rtol=0.0, atol=TINY**2), bound, values)
+    values = np.where(gone, free.ends[0], values)
     pairs = zip(free.numbers, values, strict=True)
     half = np.hypot(half, [p.error(v, case.nominal, case.control) for p, v in pairs])
     # A small value may be near its bound on the scale of the start, but differ significantly.

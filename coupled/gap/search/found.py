@@ -6,7 +6,7 @@ Fitted numbers are inseparable if their signatures nearly cancel.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from coupled.gap.effects.effect import Effect
 from coupled.gap.search.descent import Slope
 from coupled.gap.thresholds import MINOR, ROUGH
+from coupled.record.channels import ControlName
 from coupled.rig.rig import Rig
 
 Floats = NDArray[np.float64]
@@ -151,11 +152,12 @@ def alike(group: Group) -> list[Alike]:
     return found
 
 
-def inseparable(found: Fit) -> tuple[Alike, ...]:
-    """Return the numbers of a fit's effects that records determine only together."""
-    ours = {effect.value_key(p) for effect in found.effects for p in effect.free}
+def inseparable(found: Fit, control: ControlName) -> tuple[Alike, ...]:
+    """Return the numbers of a fit's effects that a control's records determine only together."""
+    ours = {e.value_key(p): f"{e.name}.{p.named(control)}" for e in found.effects for p in e.free}
     each = (one for group in found.groups.values() for one in alike(group))
-    return tuple(one for one in each if ours.issuperset(one.keys))
+    known = [one for one in each if ours.keys() >= {*one.keys}]
+    return tuple(replace(one, keys=tuple(ours[key] for key in one.keys)) for one in known)
 
 
 def _why(keys: Sequence[str]) -> str:

@@ -10,6 +10,11 @@ exceeds its log prior. Two effects may be significant together and not alone, si
 one of them has a long correlation time and few effective samples. If no single effect is worth a
 fit, the best pair is screened by the projection on both signatures. Signatures depend little on the
 other effects of a set. They are computed once, and again only with the best set.
+
+A candidate may be significant only if the sizes of the present effects change with it: a wrong
+scale takes most of the residual of damping and friction. The best candidate by the part of its
+signature that the present effects cannot make (the efficient score) is therefore fitted as well,
+or all of them if no other is worth a fit.
 """
 
 from __future__ import annotations
@@ -40,6 +45,7 @@ from coupled.gap.thresholds import (
     SCREEN_NEAR,
     SCREEN_SHOWN,
     SERVO_SHARES,
+    TINY,
 )
 from coupled.parallel import go_on, in_threads
 from coupled.rig.rig import Rig
@@ -102,7 +108,22 @@ class Screen:
             wanted, in_threads(lambda e: self._signatures(current, e), wanted), strict=True
         ):
             self.known[effect.name] = made
-        found = [self._screened(current, effect, worth.counts) for effect in candidates]
+        found = self._worth_a_fit(current, candidates, worth, most)
+        if current.effects and (anew or not found):
+            others = [e for e in candidates if all(one.effect is not e for one in found)]
+            found += self._worth_a_fit(current, others, worth, 1 if found else most, refitted=True)
+        return found
+
+    def _worth_a_fit(
+        self,
+        current: Fit,
+        candidates: Sequence[Effect],
+        worth: Worth,
+        most: int,
+        refitted: bool = False,
+    ) -> list[Screened]:
+        """Return the candidates of the largest projections; `refitted` as in `_screened`."""
+        found = [self._screened(current, e, worth.counts, refitted) for e in candidates]
         found = [one for one in found if one.starts and one.gain > worth.least]
         found.sort(key=lambda one: -one.taken)
         least = SCREEN_NEAR * found[0].taken if found else 0.0
@@ -130,10 +151,8 @@ class Screen:
             i, j = _best_two(shapes, now)
             both = shapes[[i, j]].T
             left = now - both @ np.linalg.lstsq(both, now, rcond=None)[0]
-            squares = [self._squares(ours, one) for one in (now, left)]
-            parts = np.split(left, self._edges(ours)[1:])
-            counts = np.array([len(part) / memory(part) for part in parts])
-            gain = 0.5 * float(counts @ (misfit(squares[0]) - misfit(squares[1])))
+            squares = [misfit(self._squares(ours, one)) for one in (now, left)]
+            gain = 0.5 * float(self._samples(ours, left) @ (squares[0] - squares[1]))
             if gain > worth.least + PRIOR_EFFECT and (found is None or gain > found[0]):
                 found = gain, (each[i], each[j])
         return None if found is None else found[1]
@@ -146,30 +165,72 @@ class Screen:
         """Return the first frame of each of some outputs in their joint residual."""
         return np.cumsum([0, *(len(self.problem.outputs[k].measured) for k in ours[:-1])])
 
+    def _samples(self, ours: Sequence[int], left: Floats) -> Floats:
+        """Return the effective samples of some outputs' residuals."""
+        parts = np.split(left, self._edges(ours)[1:])
+        return np.array([len(part) / memory(part) for part in parts])
+
+    def _slopes(self, current: Fit, effect: Effect) -> Floats:
+        """Return an orthonormal basis of the current effects' signatures, (frames, parameters).
+
+        The frames are those of the outputs of `effect`. Slopes that were not kept are left out.
+        """
+        problem, own = self.problem, {e.value_key(p) for e in current.effects for p in e.free}
+        ours = touched(problem.outputs, [effect])
+        columns = [np.zeros((sum(len(output.measured) for output in ours), 0))]
+        for members, group in current.groups.items():
+            numbers = [k for k, key in enumerate(group.values) if key in own]
+            if group.slope is None or not numbers:
+                continue
+            theirs = touched(problem.outputs, members)
+            edges = np.cumsum([len(output.measured) for output in theirs])[:-1]
+            parts = np.split(group.slope.jacobian[:, numbers], edges)
+            known = {id(output): part for output, part in zip(theirs, parts, strict=True)}
+            lacking = [np.zeros((len(output.measured), len(numbers))) for output in ours]
+            columns.append(
+                np.vstack([known.get(id(o), none) for o, none in zip(ours, lacking, strict=True)])
+            )
+        basis, size, _ = np.linalg.svd(np.hstack(columns), full_matrices=False)
+        return np.asarray(basis[:, size > TINY * size.max(initial=0.0)])
+
     def _squares(self, ours: Sequence[int], left: Floats) -> Floats:
         """Return the mean squares of some outputs' residuals, over their variance."""
         frames = np.array([len(self.problem.outputs[k].measured) for k in ours])
         squares = np.add.reduceat(left**2, self._edges(ours)) / frames
         return np.asarray(squares / self.variance[list(ours)])
 
-    def _screened(self, current: Fit, effect: Effect, counts: Floats) -> Screened:
-        """Return a candidate with the best start of each shape."""
-        now, ours = _residual(self.problem, effect, current.rig), self._ours(effect)
+    def _screened(
+        self, current: Fit, effect: Effect, counts: Floats, refitted: bool = False
+    ) -> Screened:
+        """Return a candidate with the best start of each shape.
 
-        def unlikely(left: Floats) -> float:
-            return 0.5 * float(counts[ours] @ misfit(self._squares(ours, left)))
+        `refitted`: the parameters of the current effects change with it, and its gain is that of
+        its effective samples without it and them.
+        """
+        now, ours = _residual(self.problem, effect, current.rig), self._ours(effect)
+        beside = self._slopes(current, effect) if refitted else np.zeros((len(now), 0))
+
+        first = misfit(self._squares(ours, now))
+
+        def gain_to(left: Floats) -> float:
+            samples = self._samples(ours, left) if refitted else counts[ours]
+            return 0.5 * float(samples @ (first - misfit(self._squares(ours, left))))
 
         taken, gain, starts = 0.0, 0.0, dict[int, tuple[float, Values]]()
         direction = np.zeros(len(now))
-        for values, shape, change in self.known[effect.name]:
-            size = float(change @ change)
+        for values, shape, whole in self.known[effect.name]:
+            size = float(whole @ whole)
             # A limit that is never reached does not change the residual.
             if size <= SCREEN_SHOWN * len(now):
                 continue
+            change = whole - beside @ (beside.T @ whole)
+            if float(change @ change) <= TINY * size:
+                continue
+            size = float(change @ change)
             share = float(now @ change) / size
             if share**2 * size >= taken:
                 taken, direction = share**2 * size, change / math.sqrt(size)
-            gain = max(gain, unlikely(now) - unlikely(now - share * change))
+            gain = max(gain, gain_to(now - share * change))
             left = float((now + change) @ (now + change))
             if shape not in starts or left < starts[shape][0]:
                 starts[shape] = left, values
