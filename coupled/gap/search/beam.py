@@ -184,14 +184,20 @@ class Beam:
     def open_outputs(self, names: Names) -> set[str]:
         """Return the outputs whose residual exceeds the noise and the model error with a set."""
         case = self.problem.case
-        first, limits = case.gaps(self.without_effects.rig), stage_limits(case.outputs)
         rig = self.fits[names].rig if names else self.without_effects.rig
-        left = case.gaps(rig) if names == self.best else stage_gaps(case.outputs, rig)
+        return self.unexplained(
+            case.gaps(rig) if names == self.best else stage_gaps(case.outputs, rig)
+        )
+
+    def unexplained(self, gaps: Mapping[str, float]) -> set[str]:
+        """Return the outputs whose gap exceeds that of the noise and the model error."""
+        case = self.problem.case
+        first, limits = case.gaps(self.without_effects.rig), stage_limits(case.outputs)
         explained = {
             at: limit if at in EXACT else explained_below(first[at], limit)
             for at, limit in limits.items()
         }
-        return {at for at, gap in left.items() if gap > explained[at]}
+        return {at for at, gap in gaps.items() if gap > explained[at]}
 
 
 def names_of(effects: Iterable[Effect]) -> Names:
@@ -340,10 +346,11 @@ def _numbers(fitted: Fit) -> int:
 def _fit_with_simpler_law(beam: Beam, law: Effect) -> Fit | None:
     """Return the best fit with an effect of fewer parameters in place of a law of the best set.
 
-    Both show in the same output. Return None if there is none, or if its neighbours are fitted.
+    Both show in the same output. Return None if the law has a single parameter, if there is no such
+    effect, or if its neighbours are fitted.
     """
     rest = beam.best - {law.name}
-    for names in beam.ranked():
+    for names in beam.ranked() if len(law.free) > 1 else ():
         if len(names) == len(beam.best) and rest < names:
             (other,) = (one for one in beam.fits[names].effects if one.name not in rest)
             if len(other.free) < len(law.free) and {*other.shows_in} & {*law.shows_in}:
@@ -394,7 +401,8 @@ def _fit_neighbours(beam: Beam, fitted: Fit, library: Sequence[Effect], wanted: 
 def _fit_by_multiple_shooting(beam: Beam) -> None:
     """Restart sets with dry friction from multiple shooting, if the loader is unexplained."""
     short, best = beam.problem.by_shots, beam.fits[beam.best]
-    if short is None or "loader" not in beam.problem.over_limit(best.rig):
+    left = stage_gaps(beam.problem.outputs, best.rig)
+    if short is None or "loader" not in beam.unexplained(left):
         return
     most = beam.log(beam.best)
     dry = [
@@ -448,13 +456,17 @@ def _contact_values(beam: Beam, fitted: Fit) -> Start:
 
 
 def _sets_with_swap(beam: Beam, fitted: Fit, library: Sequence[Effect]) -> list[Try]:
-    """Return the sets with one effect swapped for another effect of the same output."""
+    """Return the new sets with one effect swapped for another effect of the same output."""
     tries: list[Try] = []
     for old in fitted.effects:
         rest = tuple(effect for effect in fitted.effects if effect is not old)
         rig = beam.problem.rig_of(rest, fitted.values)
-        same = [e for e in _candidates(rest, library, {*old.shows_in}) if e is not old]
-        if rig is not None:
+        same = [
+            effect
+            for effect in _candidates(rest, library, {*old.shows_in})
+            if effect is not old and names_of((*rest, effect)) not in beam.fits
+        ]
+        if rig is not None and same:
             base = replace(fitted, effects=rest, rig=rig)
             found = beam.screen.best(base, same, beam.worth(beam.best), TRIES)
             tries += [
@@ -533,7 +545,7 @@ def _fit_sets(beam: Beam, tries: Sequence[Try]) -> list[Fit]:
 
     def may_be_better(one: Started) -> bool:
         names = names_of(one[1].effects)
-        if one is first[names]:
+        if one is first[names] or beam.log(names) < beam.log(beam.best) - (4.0 * GIVEN_UP):
             return False
         if not is_admissible(problem, beam.fits[names]):
             return True
@@ -574,7 +586,7 @@ def _finish(beam: Beam) -> None:
         done = problem.fit(fitted.effects, fitted.values, None, OWN, fitted)
         anew = problem.case.but_for_contact(done.values)
         known = names != beam.best or anew == dict(done.values)
-        if known or "loader" not in problem.over_limit(done.rig):
+        if known or "loader" not in beam.unexplained(stage_gaps(problem.outputs, done.rig)):
             return [done]
         return [done, problem.fit(fitted.effects, anew)]
 

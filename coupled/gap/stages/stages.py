@@ -333,10 +333,10 @@ class Reader(Reading):
             nodes = Nodes(c, coarsely if otherwise and jumps(c) else on_nodes)
 
             def at(rig: Rig, times: float) -> Floats:
-                sensed = self.sensed(rig)
-                driven_by = sensed.both(
-                    nodes.of(rig) + times * noise[0].of(rig), f + times * noise[1], computed
-                )
+                sensed, moved, pulled = self.sensed(rig), nodes.of(rig), f
+                if times:
+                    moved, pulled = moved + times * noise[0].of(rig), f + times * noise[1]
+                driven_by = sensed.both(moved, pulled, computed)
                 return sensed.at_grip(drive_linkage(rig, self.control, *driven_by, others))
 
             return self._judged(
