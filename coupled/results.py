@@ -33,7 +33,6 @@ class Display(Protocol):
         """Write a result's report."""
 
 
-@public
 class Plain:
     """A dataclass whose JSON is its fields."""
 
@@ -42,6 +41,7 @@ class Plain:
         return {name: value for name, value in vars(self).items() if value is not None}
 
 
+@public
 class Displayed:
     """Something that a notebook displays, and that has a report."""
 

@@ -13,6 +13,7 @@ from scipy.signal import bilinear, lfilter, welch
 
 from coupled.gap.findings.where import _peak
 from coupled.gap.noise.noise import Noise, filtered, of_second_order
+from coupled.gap.thresholds import SHORTEST_RECORD_s
 
 RATE_Hz = 120.0
 
@@ -50,7 +51,9 @@ def test_a_loader_answers_as_tustins_rule_has_it(
 def test_the_loudest_frequency_is_that_of_welchs_spectrum(frames: int, memory: float) -> None:
     left = Noise(1.0, memory).sample(frames, np.random.default_rng(frames))
     left += 0.2 * np.sin(2.0 * np.pi * 3.3 * np.arange(frames) / RATE_Hz) + 0.5
-    frequency, density = welch(left, RATE_Hz, nperseg=min(frames, round(8.0 * RATE_Hz)))
+    frequency, density = welch(
+        left, RATE_Hz, nperseg=min(frames, round(SHORTEST_RECORD_s * RATE_Hz))
+    )
     assert _peak(left, RATE_Hz) == pytest.approx(frequency[1:][np.argmax(density[1:])])
 
 

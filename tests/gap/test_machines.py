@@ -71,7 +71,8 @@ def test_a_wrong_scale_does_not_stand_for_damping_and_friction_together() -> Non
     assert len(known) == 2
     (other,) = known.keys() - {"viscous_damping"}
     assert other in ("force_offset", "force_zero", "coulomb_friction", "breakout")
-    assert abs(known[other].value) == pytest.approx(MOTOR_DRY_N, rel=0.05)
+    value = known[other].value
+    assert value is not None and abs(value) == pytest.approx(MOTOR_DRY_N, rel=0.05)
     assert known[other].probability < 0.5
 
 

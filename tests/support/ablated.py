@@ -258,8 +258,8 @@ def newcombe(both: int, first: int, second: int, neither: int) -> tuple[float, f
     low_1, high_1 = binomtest(both + first, count).proportion_ci(method="wilson")
     low_2, high_2 = binomtest(both + second, count).proportion_ci(method="wilson")
     product = float(both + first) * (second + neither) * (both + second) * (first + neither)
-    excess = both * neither - first * second
-    excess = max(excess - count / 2.0, 0.0) if excess > 0 else float(excess)
+    excess = float(both * neither - first * second)
+    excess = max(excess - count / 2.0, 0.0) if excess > 0.0 else excess
     phi = excess / math.sqrt(product) if product > 0.0 else 0.0
 
     def away(a: float, b: float) -> float:
@@ -312,16 +312,17 @@ def row(rule: Rule, key: Key, todo: Sequence[Job], output: Path) -> str:
     known = answers(WITH, base)
     found = known | answers(rule.name, other)
     pairs = [(is_right(known[name]), is_right(found[name])) for name in base]
-    counts = [pairs.count(pair) for pair in ((True, True), (True, False), (False, True))]
-    low, high = newcombe(*counts, len(pairs) - sum(counts))
+    counts = [pairs.count(one) for one in ((True, True), (True, False), (False, True))]
+    both, lost, gained = counts
+    low, high = newcombe(both, lost, gained, len(pairs) - sum(counts))
     changed = sum(said(known[name]) != said(found[name]) for name in base)
     worse = 100.0 * np.array([brier(found[name]) - brier(known[name]) for name in base])
     few = len(worse) < 2
     half = 0.0 if few else float(student.ppf(0.975, len(worse) - 1) * worse.std(ddof=1))
     half /= math.sqrt(len(worse))
-    loss = 100.0 * (counts[1] - counts[2]) / len(pairs)
+    loss = 100.0 * (lost - gained) / len(pairs)
     cells = [
-        *(rule.name, len(acts), changed, len(base), counts[0] + counts[1], counts[0] + counts[2]),
+        *(rule.name, len(acts), changed, len(base), both + lost, both + gained),
         *(f"{loss:.1f}", f"{100.0 * low:.1f} to {100.0 * high:.1f}"),
         *(f"{worse.mean():.2f}", f"{worse.mean() - half:.2f} to {worse.mean() + half:.2f}"),
         "" if rule.after_search or not saved_s else f"{np.mean(saved_s):.1f}",

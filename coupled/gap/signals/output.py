@@ -259,12 +259,14 @@ def estimate_noise(signal: Floats) -> Noise:
 def rounding(signal: Floats, noise: float) -> float:
     """Return the rms error of a signal's rounding, from the least step between its values.
 
-    Zero if that would be `ROUNDED` times `noise`: the even steps of a ramp, and the few levels of
-    a test, are not rounding.
+    Zero if that would be `SIGMAS` times `noise`: the even steps of a ramp, and the few levels of
+    a test, are not rounding. Nor are steps that a double of the signal's size does not resolve.
     """
     steps = np.diff(np.unique(signal))
-    error = float(steps.min()) / math.sqrt(12.0) if steps.size else 0.0
-    return error if error < SIGMAS * noise else 0.0
+    step = float(steps.min()) if steps.size else 0.0
+    error = step / math.sqrt(12.0)
+    resolved = step >= float(np.spacing(np.max(np.abs(signal)))) if steps.size else False
+    return error if resolved and error < SIGMAS * noise else 0.0
 
 
 def spread(
