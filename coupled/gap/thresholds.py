@@ -152,7 +152,6 @@ MISMATCH = 0.03  # prior: model error of a right effect, share of the gap
 # 215 (docs/blind-score.json), 0.898, rounded down to the two figures printed.
 STATED_MOST = 0.89  # error rate
 SURE = 0.97  # error rate: of 52 credible effects without an alternative 51 were right
-DOUBT = 0.1  # error rate: of 13 incredible effects in blind records none was right
 CERTAIN = 0.6  # error rate: of 6 effects of 0.6 to 0.7 in three seeds 5 were right, of 5 below 2
 
 # When and where a gap lies (`where`, `course`).

@@ -134,7 +134,6 @@ RULES = (
     Rule("stated_most", "findings.answer:STATED_MOST", 1.0,
          "no probability above 0.89"),
     Rule("sure", "findings.answer:SURE", 1.0, "a credible effect's posterior times 0.97"),
-    Rule("doubt", "findings.answer:DOUBT", 0.0, "an incredible effect's posterior times 0.1"),
     Rule("neutral_cap", "findings.answer:has_size", gives(True),
          "below certain where the interval includes neutral"),
     Rule("host_drift", "findings.credibility:HOST_DRIFT", DRIFT,

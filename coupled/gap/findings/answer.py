@@ -25,7 +25,7 @@ from coupled.gap.search.found import Choice, Found
 from coupled.gap.search.histories import course_in
 from coupled.gap.signals.output import Output
 from coupled.gap.stages.stages import Reader
-from coupled.gap.thresholds import CERTAIN, DOUBT, MOST, NEGLIGIBLE, STATED_MOST, SURE, UNDERSTATED
+from coupled.gap.thresholds import CERTAIN, MOST, NEGLIGIBLE, STATED_MOST, SURE, UNDERSTATED
 from coupled.record.channels import ControlName, unit_of
 from coupled.rig.rig import Rig
 
@@ -140,11 +140,10 @@ def effects_of(
         effect = step.effect
         beside = max(remains.get(stage_of(output), 0.0) for output in effect.shows_in)
         known = credibility(effect, case, choice.fit, records, beside)
-        sure = DOUBT + (SURE - DOUBT) * known.value
         scatter = _sample_error(effect, readers)
         numbers = tuple(_estimate(choice, effect, p, case, scatter) for p in effect.free)
         most = STATED_MOST if has_size(effect, case, numbers) else (CERTAIN - NEGLIGIBLE)
-        probability = min(step.probability * sure, most)
+        probability = min(step.probability * SURE * known.value, most)
         course = course_in(effect, case, choice.fit, records)
         given = (effect.name, effect.stage, probability, numbers, known, course)
         return EffectResult(*given, of=effect.of)
