@@ -20,7 +20,7 @@ _READ, _WRITE = "_ZNK14SGPropertyNode14getDoubleValueEv", "_ZN14SGPropertyNode14
 _TABLE = "_ZTV14SGPropertyNode"
 _WORD = ctypes.sizeof(ctypes.c_void_p)
 _TO_FUNCTIONS = 2 * _WORD  # a table begins with an offset and the type
-_LONGEST = 8 * _WORD  # of a node's Python object
+_LONGEST = 4 * _WORD  # of a node's object: its head, Cython's table, and the node; all are pointers
 
 
 class NodeFunctions(NamedTuple):
