@@ -46,20 +46,20 @@ BEGUN_AWAY, BEGUN_MOVING = 0.05, 0.25
 
 # Noise and rounding of a channel (`noise`).
 ROUNDING_SPAN = 1e-6  # tolerance: of a channel's span, the least resolution of a file; ablated
-NOISE_FROM = 0.4  # prior: of the Nyquist frequency, above which is noise alone; with 0.2 and 0.7
-# the noise of 681 channels with known noise is within 2 % of the same
-WHITE_FRAMES = 400  # step: frames; with fewer the colour is not estimated; ablated
+NOISE_FROM = 0.4  # prior: of the Nyquist frequency, above which is noise alone; chosen
+NOISE_BANDS = 20  # step: bands in all; chosen
+WHITE_FRAMES = 400  # step: frames; fewer are too few for bands; chosen
 COLOURS = tuple(0.02 * k for k in range(43))  # step: lag-one correlations, to 0.84
-PIECE = 64  # step: frames of a spectrum; chosen
+COLOUR_FITS = 2.5  # error rate: largest χ² for each degree of freedom; chosen
+FOLLOWS_ON = 3.5  # error rate: standard deviations of the next lower band; chosen
+PIECE, QUIET_FROM = 64, 5  # step: frames of a spectrum, and its first frequency of noise; chosen
 QUIET_SHARE = 0.3  # step: of the quieter pieces; 0.5 includes pieces in which a loader sticks
-BESIDE_FROM = 0.15  # step: of the Nyquist frequency; below it the taper leaks
+BESIDE_FROM = 0.15  # step: of the Nyquist frequency, from which noise and signal are separated
 # Error rate: least decrease of χ² for noise colour or a signal in white noise. With it the density
 # at low frequencies is 0.7 to 2.0 times the true one in 22 coloured channels; without it 0.3 to 4.
 BESIDE_BY = 6.0
-STEEPNESSES = (6.0, 10.0)  # step: exponents of the decay of a signal's spectrum; with 8 and 12
-# too the noise of those channels is estimated no better
-LEVELS = tuple(-4.0 + 0.5 * k for k in range(24))  # step: ln of that signal's level; with 0.125
-# the noise of those channels is the same
+STEEPNESSES = (6.0, 8.0, 10.0, 12.0)  # step: exponents of the decay of a signal's spectrum; chosen
+LEVELS = tuple(-4.0 + 0.25 * k for k in range(48))  # step: ln of that signal's level; chosen
 LINE_HEIGHT = 30.0  # error rate: 10⁻⁹ for 7200 frames of white noise
 TAPER_BINS = 3  # step: bins to either side that a tone fills under a Hann window
 MAINS_Hz = (50.0, 60.0, 400.0)  # prior: mains of the ground, and of aircraft (MIL-STD-704)

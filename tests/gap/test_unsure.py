@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from coupled.gap.diagnose import diagnose
-from coupled.gap.noise.noise import Noise, noise_of
+from coupled.gap.noise.noise import Noise, noise_of_input
 from coupled.record.record import Record
 from tests.support import gaps, records
 
@@ -33,7 +33,8 @@ def estimated_power(memory: float) -> list[tuple[float, float]]:
     true, found = Noise(0.15, memory), []
     for seed in range(40):
         rng = np.random.default_rng([8, seed])
-        noise = noise_of(force(rng) + true.sample(FRAMES, rng))
+        noise = noise_of_input(force(rng) + true.sample(FRAMES, rng))
+        assert noise is not None
         found.append((slow(noise) / slow(true), noise.unsure))
     return found
 

@@ -175,7 +175,7 @@ def _estimate(
     twin = other_side(value, case.nominal.frame_rate) if p.kind == "aliased" else None
     if twin is not None:  # aliased: the tone may lie on either side of the Nyquist frequency
         low, high = min(low, twin - (value - low)), max(high, twin + (high - value))
-    if p.low >= 0.0:  # the rig's own number cannot be negative
+    if p.low >= 0.0 and math.isfinite(low):  # the rig's own number cannot be negative
         least = p.bounds(case.nominal, case.control)[0] if p.mode == "added" else 0.0
         low = max(low, min(least, value))
     ends = (low if math.isfinite(low) else None, high if math.isfinite(high) else None)

@@ -1,19 +1,23 @@
-"""The noise of a channel and of a residual.
+"""The noise of a channel, of a residual and of an input.
 
-Noise is white, or that of a first-order lag, whose power falls as 1/(1 + a² − 2a·cos ω), a being
-the correlation from frame to frame. The spectrum is taken in pieces of half a second. At each
-frequency the 30 % quantile of the pieces counts, so that rare events are left out; lines of the
-mains are rejected as outliers.
+Of a channel, it is estimated from the part of the spectrum above the signal. Above 0.4 of the
+Nyquist frequency the motion of a rig is far below sensor noise. There the noise is white, or that
+of a first-order lag, whose power falls as 1/(1 + a² − 2a·cos ω), a being the correlation from frame
+to frame. This model extrapolates to lower frequencies. Of each band only the lowest nine tenths of
+the spectrum count, so that a line (mains hum) is not taken for noise. A log that was filtered or
+resampled has almost no power there, and its noise cannot be estimated.
 
-Of a channel, noise and the signal's own spectrum, which falls with some power of frequency, are
-fitted together. Among the models that fit about as well, the noise with the least power at low
-frequencies is taken. `unsure` is how much more the best fit has there. The level is that above 0.4
-of the Nyquist frequency, where the motion of a rig is far below sensor noise. A log that was
-filtered or resampled has almost no power there, and its noise cannot be estimated.
+Of a residual, it is estimated from the quieter pieces of half a second. The spectrum of a control
+that sticks, slips or closes its backlash falls as slowly as that of coloured noise, and hides the
+noise. A stage's residual contains that only as far as the stage has a gap. The spectrum is taken in
+short pieces, and at each frequency the 30 % quantile of the pieces counts, so that rare events are
+left out; lines of the mains are rejected as outliers. The noise is white, or that of a first-order
+lag, as of a channel.
 
-The spectrum of a control that sticks, slips or closes its backlash falls as slowly as that of
-coloured noise, and hides the noise. A stage's residual contains that only as far as the stage has a
-gap. Therefore the noise of a stage's output is estimated from its residual, without a signal.
+The noise of a force cannot be taken from a residual, since the force is an input. There the
+signal's own spectrum, which falls with some power of frequency, is fitted together with the noise.
+Among the models that fit about as well, the noise with the least power at low frequencies is taken.
+`unsure` is how much more the best fit has there.
 
 Filters are solved as banded systems; `scipy.signal` is slow to import.
 """
@@ -31,12 +35,17 @@ from scipy.linalg import solve_banded
 from coupled.gap.thresholds import (
     BESIDE_BY,
     BESIDE_FROM,
+    COLOUR_FITS,
     COLOURS,
+    FOLLOWS_ON,
     LEVELS,
     MINOR,
     MOST,
+    NEARLY_ALL,
+    NOISE_BANDS,
     NOISE_FROM,
     PIECE,
+    QUIET_FROM,
     QUIET_SHARE,
     SIGMAS,
     STEEPNESSES,
@@ -95,21 +104,23 @@ class Noise:
 
 
 def noise_of(signal: Floats) -> Noise:
-    """Return the noise of a smooth signal, shape (frames,).
-
-    If the signal is short or has no noise, it is white, with the rms of fourth differences by √70.
-    """
+    """Return the noise of a smooth signal; if short, from the rms of fourth differences by √70."""
     rough = np.diff(signal, 4)
     plain = Noise(float(np.sqrt(np.mean(rough**2) / 70.0)) if len(rough) else 0.0)
-    if len(signal) < WHITE_FRAMES:
+    if len(rough) < WHITE_FRAMES or jumps(signal):  # jumps hide the colour
         return plain
-    omega, logs, variance = _levels(signal, 4)
-    if not np.all(np.isfinite(logs)):
+    at, levels = _bands(rough)
+    high = at >= NOISE_FROM * math.pi
+    if not np.all(levels[high] > 0.0):
         return plain
-    alone = logs[omega >= NOISE_FROM * math.pi]
-    if (least := float(np.median(alone[-3:]))) < math.log(MINOR) + float(np.median(alone[:3])):
-        return Noise(math.exp(0.5 * least), filtered=True)
-    return _beside_signal(omega, logs, variance)
+    sure, variance = levels[high], _log_variance(rough)
+    least = float(np.median(sure[-3:]))
+    if least < MINOR * float(np.median(sure[:3])):
+        return Noise(math.sqrt(least), filtered=True)
+    memory = _memory(at, levels, int(np.argmax(high)), variance)
+    logs = np.log(sure / _shape(at[high], memory))
+    white = float(np.exp(np.mean(logs) + 0.5 * variance))
+    return Noise(math.sqrt(white / (1.0 - memory**2)), memory)
 
 
 def jumps(signal: Floats) -> bool:
@@ -128,32 +139,121 @@ def between_jumps(signal: Floats) -> Noise:
     return known if known.rms <= usual / MOST else Noise(usual)
 
 
+def _bands(rough: Floats) -> tuple[Floats, Floats]:
+    """Return the middle frequencies of bands, rad a frame, and the noise's variance in each.
+
+    `rough` are fourth differences, with the gain |2 sin(ω/2)|⁸ of power. The mean of each band is
+    that of its lower part, corrected for the bias with an exponential distribution.
+    """
+    taper = np.hanning(len(rough))
+    power = np.abs(np.fft.rfft(rough * taper)) ** 2 / float(taper @ taper)
+    omega = np.linspace(0.0, math.pi, len(power))
+    keep = (omega >= math.pi / NOISE_BANDS) & (omega < 0.99 * math.pi)
+    power, omega = power[keep] / (2.0 * np.sin(0.5 * omega[keep])) ** 8, omega[keep]
+    parts = np.array_split(np.arange(len(power)), NOISE_BANDS - 1)
+    rest = 1.0 - NEARLY_ALL
+    biased = (NEARLY_ALL + rest * math.log(rest)) / NEARLY_ALL
+    levels = []
+    for part in parts:
+        quiet = np.sort(power[part])[: max(1, round(NEARLY_ALL * len(part)))]
+        levels.append(float(np.mean(quiet)) / biased)
+    return np.array([float(np.mean(omega[part])) for part in parts]), np.array(levels)
+
+
+def _log_variance(rough: Floats) -> float:
+    """Return the variance of the logarithm of a band's mean.
+
+    With the taper about two of three bins are independent.
+    """
+    bins = len(rough) / 2.0 / NOISE_BANDS
+    return 1.5 / bins
+
+
+def _shape(at: Floats, memory: float) -> Floats:
+    """Return the power of a first-order lag's noise over that of its white input."""
+    return 1.0 / (1.0 + memory**2 - 2.0 * memory * np.cos(at))
+
+
+def _memory(at: Floats, levels: Floats, first: int, variance: float) -> float:
+    """Return the correlation of the noise by frames; 0 if white noise explains it as well.
+
+    The bands from `first` on are noise. Lower bands are added as long as they agree with the
+    extrapolation. A signal's spectrum is much steeper than a first-order lag, so it departs at
+    once.
+    """
+    memory, logs = 0.0, np.log(np.maximum(levels, 1e-300))
+    while True:
+        memory = _fitted(at[first:], logs[first:], variance)
+        if first == 0:
+            return memory
+        level = float(np.mean(logs[first:] - np.log(_shape(at[first:], memory))))
+        expected = level + math.log(float(_shape(at[first - 1 : first], memory)[0]))
+        if abs(logs[first - 1] - expected) > FOLLOWS_ON * math.sqrt(variance):
+            return memory
+        first -= 1
+
+
+def _fitted(at: Floats, logs: Floats, variance: float) -> float:
+    """Return the correlation that fits some bands; 0 if white noise fits about as well."""
+    tries = np.array([logs - np.log(_shape(at, a)) for a in COLOURS])
+    misfit = np.sum((tries - tries.mean(axis=1, keepdims=True)) ** 2, axis=1) / variance
+    best = int(np.argmin(misfit))
+    better = misfit[0] - misfit[best] > (2.0 * BESIDE_BY)
+    fits = misfit[best] < COLOUR_FITS * (len(at) - 2)
+    return COLOURS[best] if better and fits else 0.0
+
+
 _SHAPES = np.array(COLOURS)[:, None]
 # Power of a signal at half the Nyquist frequency, over that of the noise at its end.
 SIGNALS = np.concatenate(([0.0], np.exp(LEVELS)))
 
 
 def quiet_noise(residual: Floats) -> Noise | None:
-    """Return the noise of a residual, shape (frames,); None if it is short or has no noise.
-
-    It is fitted from the lowest frequency from which noise alone explains the spectrum by χ².
-    """
+    """Return the noise of a residual, shape (frames,); None if it is short or has no noise."""
     if len(residual) < WHITE_FRAMES:
         return None
     omega, logs, variance = _levels(residual, 1)
+    omega, logs = omega[QUIET_FROM - 1 :], logs[QUIET_FROM - 1 :]
     if not np.all(np.isfinite(logs)):
         return None
-    memory, level = 0.0, 0.0
-    for first in range(int(np.searchsorted(omega, NOISE_FROM * math.pi)) + 1):
-        memory, level, misfit = _fitted_levels(omega[first:], logs[first:], variance)
-        free = len(logs) - first - 2
-        if misfit < free + SIGMAS * math.sqrt(2.0 * free):
+    first = int(np.searchsorted(omega, NOISE_FROM * math.pi))
+    while True:
+        memory, level, _ = _fitted_levels(omega[first:], logs[first:], variance)
+        if first == 0:
             break
+        next_one = level + float(_log_shape(omega[first - 1], np.array(memory)))
+        if logs[first - 1] - next_one > SIGMAS * math.sqrt(variance):
+            memory, level = _coloured_from_below(omega, logs, variance, first) or (memory, level)
+            break
+        first -= 1
     return Noise(math.sqrt(math.exp(level) / (1.0 - memory**2)), memory)
 
 
-def _beside_signal(omega: Floats, logs: Floats, variance: float) -> Noise:
-    """Return the noise that explains a spectrum together with a signal (the module's docstring)."""
+def _coloured_from_below(
+    omega: Floats, logs: Floats, variance: float, first: int
+) -> tuple[float, float] | None:
+    """Return the colour and level that explain more frequencies than those from `first` on.
+
+    Far above its corner frequency coloured noise looks white, and its part below like a signal.
+    None if no colour fits up to the Nyquist frequency by χ².
+    """
+    for begin in range(first):
+        memory, level, misfit = _fitted_levels(omega[begin:], logs[begin:], variance)
+        free = len(logs) - begin - 2
+        if memory > 0.0 and misfit < free + SIGMAS * math.sqrt(2.0 * free):
+            return memory, level
+    return None
+
+
+def noise_of_input(signal: Floats) -> Noise | None:
+    """Return the noise of a smooth signal, shape (frames,); None if it is short or has no noise."""
+    if len(signal) < WHITE_FRAMES:
+        return None
+    omega, logs, variance = _levels(signal, 4)
+    high = omega >= BESIDE_FROM * math.pi
+    omega, logs = omega[high], logs[high]
+    if not np.all(np.isfinite(logs)):
+        return None
     shapes = _log_shape(omega, _SHAPES) - _log_shape(math.pi, _SHAPES)  # (colours, frequencies)
     each = []
     for steepness in STEEPNESSES:
@@ -172,7 +272,6 @@ def _beside_signal(omega: Floats, logs: Floats, variance: float) -> Noise:
         power = (0.5 * math.pi / omega) ** STEEPNESSES[steep]
         left = logs - np.log(np.exp(shapes[colour]) + SIGNALS[size] * power)
         near_it = np.abs(left - np.median(left)) < SIGMAS * math.sqrt(variance)
-        near_it &= omega >= NOISE_FROM * math.pi  # below it the taper smears the steep spectrum
         return float(np.exp(np.mean(left[near_it]))) * (1.0 + COLOURS[colour]) ** 2
 
     near = misfits < misfits.min() + BESIDE_BY
@@ -194,10 +293,8 @@ def _levels(signal: Floats, differences: int) -> tuple[Floats, Floats, float]:
     rough = np.diff(signal, differences)
     pieces = np.lib.stride_tricks.sliding_window_view(rough, PIECE)[:: PIECE // 2]
     power = np.abs(np.fft.rfft(pieces * taper, axis=1)) ** 2 / float(taper @ taper)
-    omega = np.linspace(0.0, math.pi, power.shape[1])
-    inner = slice(int(np.searchsorted(omega, BESIDE_FROM * math.pi)), -1)
-    omega = omega[inner]
-    power = power[:, inner] / (2.0 * np.sin(0.5 * omega)) ** (2 * differences)
+    omega = np.linspace(0.0, math.pi, power.shape[1])[1:-1]
+    power = power[:, 1:-1] / (2.0 * np.sin(0.5 * omega)) ** (2 * differences)
     # The quantile q of exponentially distributed values is −ln(1 − q) times the mean.
     middle = -math.log(1.0 - QUIET_SHARE)
     with np.errstate(divide="ignore"):

@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from coupled.gap.noise.lines import Line, lines_in
-from coupled.gap.noise.noise import Noise, noise_of
+from coupled.gap.noise.noise import Noise, noise_of, noise_of_input
 from coupled.gap.thresholds import FEW_FRAMES, PIECE, SIGMAS, SMALL
 
 Floats = NDArray[np.float64]
@@ -185,10 +185,13 @@ def _known(signal: bytes, orders: tuple[int, ...], noise: Noise | None) -> Smoot
 def _colour(signal: Floats, noise: Noise | None) -> float:
     """Return the noise's correlation from frame to frame, as given or as estimated.
 
-    Zero for noise that is a large part of the signal, since its colour may then be the signal's.
+    Zero for a filtered log, and for noise that is a large part of the signal, since its colour may
+    then be the signal's.
     """
-    noise = noise_of(signal) if noise is None else noise
-    return noise.memory if noise.rms <= SMALL * float(np.std(signal)) else 0.0
+    if noise is None and not noise_of(signal).filtered:
+        noise = noise_of_input(signal)
+    clear = noise is not None and noise.rms <= SMALL * float(np.std(signal))
+    return noise.memory if noise is not None and clear else 0.0
 
 
 def _gain(long: Floats, orders: Sequence[int], memory: float) -> Floats:

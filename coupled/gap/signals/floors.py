@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.gap.noise.noise import Noise, quiet_noise
+from coupled.gap.noise.noise import Noise, noise_of_input, quiet_noise
 from coupled.gap.noise.smooth import Rest, Smoother, rest_of, smoothed
 from coupled.gap.signals.output import estimate_noise, rounding
 from coupled.gap.thresholds import FEW_FRAMES, SHORT_FRAMES, SIGMAS, TINY
@@ -35,6 +35,12 @@ def given_noise(rig: Rig, channel: str, signal: Floats) -> Noise:
     known = rig.noise.get(channel, 0.0)
     least = TINY * float(np.sqrt(np.mean(signal**2)))
     return Noise(known or max(least, rounding(signal, np.inf)))
+
+
+def input_noise(estimated: Noise, signal: Floats) -> Noise:
+    """Return the noise of a stage's input; at least its rounding."""
+    found = None if estimated.filtered else noise_of_input(signal)
+    return estimated if found is None else _no_less(found, signal)
 
 
 def left_noise(

@@ -19,7 +19,7 @@ from coupled.gap.noise.noise import Noise, noise_of
 from coupled.gap.noise.smooth import smoothed
 from coupled.gap.signals.conditions import left
 from coupled.gap.signals.drives import drifts, softest_gradient
-from coupled.gap.signals.floors import Drive, floor_from, noise_in
+from coupled.gap.signals.floors import Drive, floor_from, input_noise, noise_in
 from coupled.gap.signals.live import Assumed, Live, Mask, live_of
 from coupled.gap.signals.missed import Missed, missed_in
 from coupled.gap.signals.output import Floats
@@ -344,7 +344,7 @@ class Reading:
 
     def driving(self, quantity: str) -> Noise:
         """Return the noise of a control's channel as an input, without a broadband signal."""
-        return self.channel_noise(quantity)
+        return input_noise(self.channel_noise(quantity), self._quiet(self.name_of(quantity)))
 
     def filtered(self) -> dict[str, str]:
         """Return {filtered channel of the control: source of its noise floor}."""

@@ -236,9 +236,12 @@ class Series:
         return taken_up if reading.by_hand else at
 
     def _begun(self, rig: Rig, bending: Floats) -> Restart | None:
-        """Return the measured start of the loader, if the record does not begin at rest."""
+        """Return the measured start of the loader, if the record does not begin at rest.
+
+        A grip moved by a bench begins anywhere within the play, so its start is not known.
+        """
         reading = self._reading
-        if not reading.begins_moved:
+        if not reading.begins_moved or reading.by_hand:
             return None
         bend = rig.controls[reading.control].loader.bend
         place = reading.sensed(rig).from_grip(self._grip) - bend * bending
