@@ -44,7 +44,7 @@ def node_functions(module: str) -> NodeFunctions | None:
 
 
 def node_of(method: Callable[..., object]) -> object:
-    """Return the node of a property's function; None if it is none of a single node."""
+    """Return the node whose method a function is; None if it is no node's method."""
     return getattr(method, "__self__", None)
 
 

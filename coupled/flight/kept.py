@@ -27,7 +27,7 @@ from coupled.flight.manoeuvre import Manoeuvre
 from coupled.flight.putback import tells
 from coupled.rig.parameters import Flight
 
-# Of JSBSim's package.
+# Models of JSBSim's package that its reset restores exactly.
 PUT_BACK_EXACTLY = frozenset({"737", "B747", "T37", "f16"})
 # Keys of a flight section that only set its trim, or change no aircraft.
 _HARMLESS = frozenset(

@@ -5,7 +5,8 @@
     step          of an algorithm: a grid, a number of repeats, a step of a difference
     error rate    of a test, as a probability or in standard deviations
 
-"Blind trials" are records of `coupled blind make`; no constant was set on a published score.
+"Blind trials" are records of `coupled blind make`; of the constants only `STATED_MOST` is set by
+a published score.
 "Chosen" marks a value set by judgement, without a count that supports it. "Ablated" marks one of
 which half and twice, in groups, change no right answer of 29 records of seed 2044.
 """
@@ -17,7 +18,7 @@ SIGMAS = 3.0  # error rate: control limits (Shewhart 1931); a false alarm in som
 FAR_SIGMAS = 8.0  # error rate, of an error whose distribution is not known; ablated
 TINY = 1e-3  # step: a change that no result depends on; ablated
 NEGLIGIBLE = 0.01  # tolerance: a share, an angle in rad or a gain that does not count; ablated
-FEW = 0.02  # tolerance: part of a signal's values or of a residual that is noise's; ablated
+FEW = 0.02  # tolerance: share of a signal's values, or of a residual, that may be noise; ablated
 MINOR = 0.05  # error rate: a part, a correlation or 1 − cosine that is not distinct; chosen
 SMALL = 0.1  # tolerance: of a signal's rms, up to which an error hides nothing; chosen
 LESSER = 0.2  # step: of what a correct explanation, or a further step, may leave; chosen

@@ -331,9 +331,9 @@ def sliding_speed(
     span: float,
     load: float,
 ) -> tuple[float, float]:
-    """Return the speed at the middle of a step of `span` seconds, in d/s.
+    """Return the speed amid a step of `span` seconds, d/s, and the bristles' deflection then, d.
 
-    And the deflection of the bristles after it, d. For friction without a curve over the rate.
+    This function is for friction without a curve over the rate.
 
     `push` is the force without friction, N, `inertia` the inertia to be moved, N·s/d, `direction`
     the direction in which a rigid contact slides, `load` the load, N.

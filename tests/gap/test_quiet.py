@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from coupled.gap.noise.noise import Noise, noise_of, noise_of_input, quiet_noise
 from coupled.gap.signals.floors import left_noise
+from coupled.gap.signals.output import rounding
 
 FRAMES, RATE_Hz = 4800, 120.0
 TIME = np.arange(FRAMES) / RATE_Hz
@@ -84,3 +85,10 @@ def test_frames_that_are_not_judged_do_not_lower_the_noise(share: float) -> None
     assert found.memory == 0.0
     nowhere = np.zeros(FRAMES, dtype=bool)
     assert left_noise(Noise(0.1), sticking(), 0.0 * left, nowhere) == Noise(0.1)
+
+
+def test_a_signal_that_decays_to_nothing_is_not_counted_in_its_last_steps() -> None:
+    decaying = 0.1 * np.exp(-np.arange(600.0))
+    assert rounding(decaying, math.inf) == 0.0
+    counted = np.round(decaying, 3)
+    assert rounding(counted, math.inf) == pytest.approx(1e-3 / math.sqrt(12.0))

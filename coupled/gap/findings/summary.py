@@ -125,7 +125,7 @@ def _what(found: Findings, floor: str) -> str:
     budgets = {one.stage: one for one in found.budget}
     stages = [found.stage(name) for name in found.guilty]
     acting = {stage.name: _acting(found, stage, budgets.get(stage.name)) for stage in stages}
-    # A stage that only others show, by the same effects, has nothing more to say.
+    # A stage without an output, with the effects of its neighbours, is not described again.
     by_others = [
         stage
         for stage in stages
@@ -356,7 +356,7 @@ def closes(shrink: Shrink) -> str:
     few = "" if most.reliable else ", from too few stretches to rely on"
     low, high = round(100 * most.low), round(100 * most.high)
     ends = f"{low} to {high} %{few}"
-    if few and (most.low <= 0.0 or low == high):  # some hold no gap to close, or there is but one
+    if few and (most.low <= 0.0 or low == high):  # stretches without a gap, or only one
         ends = "from too few stretches for an interval"
     return f"It closes {100 * most.closed:.0f} % of the gap on held-out data ({ends})."
 

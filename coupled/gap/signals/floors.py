@@ -120,9 +120,9 @@ def share_in_response(force: Floats, answer: Floats) -> float:
 
 
 def _regressed(signal: Floats, onto: Floats, delays: range) -> tuple[float, float]:
-    """Return the rms of a signal's white noise, and that without what another signal repeats.
+    """Return the rms of a signal's white noise, before and after regression on another signal.
 
-    Fourth differences are regressed on those of the other signal, delayed by so many frames.
+    Fourth differences are regressed on those of the other signal, delayed by `delays` frames.
     """
     rough, other = np.diff(signal, 4), np.diff(onto, 4)
     inner = slice(max(delays.stop, 0), len(rough) + min(delays.start, 0))

@@ -23,7 +23,9 @@ from coupled.record.importing.mapping import CHANNELS, Channel, Clock, Layout, L
 
 LOOKED_AT_bytes = 2**17  # of a file, which contain its head
 ANGLES = ("pitch_rad", "alpha_rad")
-JUMPS = 20.0  # chosen: ratio to later steps, above which the first row precedes JSBSim's trim
+# Ratio to later steps, above which the first row precedes JSBSim's trim; half and twice change no
+# log of `tests/record/importing/test_heads.py`.
+JUMPS = 20.0
 LEAST_JUMP_rad = 1e-5
 # A column's name, with its channel and unit.
 _JSBSIM = {

@@ -26,6 +26,7 @@ _LENGTHS = {"in": 0.0254, "cm": 0.01, "mm": 1e-3, "ft": 0.3048}
 _ANGLE = {"deg": np.pi / 180.0}
 TOGETHER = 0.6  # correlation of a force with a spring's, from which its ratio shows its unit
 WHOLE_RANGE = 0.9  # of the range: jump of a position that wraps
+# Half and twice of these two change no test of imports and sensors.
 END_OVER_STEP = 20.0  # least jump of a spike in the first or last row, over the step beside it
 LEAST_POWER = 0.05  # correlation of force and rate from which power has a sign
 SMALL_STEP = 0.2  # of the range: largest other step of a position from row to row
