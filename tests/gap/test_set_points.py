@@ -55,6 +55,10 @@ def test_a_number_without_noise_is_a_set_point_however_fast_they_come() -> None:
         data = record.data.copy()
         data[:, record.channels.index("column_computed_m")] = measured
         assert as_driven(rig, [Record(record.channels, data)], "column") == rig
+    times = np.arange(3000) / 50.0
+    chirp = 0.3 * np.sin(2.0 * np.pi * times * (0.1 + 7.0 * times / times[-1]))
+    swept = servo(chirp)  # its own motion reaches 14 Hz, which a noise of all frames would include
+    assert as_driven(rig, [swept], "column") == servo_rig()
     hosted = np.column_stack((record.data, np.full(len(POINTS), 1000.0)))
     host = Record((*record.channels, "column_gradient_N_per_m"), hosted)
     assert as_driven(rig, [host], "column") == rig

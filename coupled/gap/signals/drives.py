@@ -19,10 +19,12 @@ import math
 from collections.abc import Collection
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from coupled.gap.signals.output import Floats, estimate_noise, rounding
 from coupled.gap.thresholds import (
     FEW,
+    FEW_FRAMES,
     MOST,
     NEGLIGIBLE,
     SHORT_FRAMES,
@@ -81,8 +83,25 @@ def _made(record: Record, control: ControlName) -> bool:
     given, grip = channel(control, "computed"), channel(control, "deflection")
     if any(name in record for name in others) or not (given in record and grip in record):
         return False
-    noise, own = (estimate_noise(record[name]).rms for name in (grip, given))
-    return own < NEGLIGIBLE * noise
+    return _finest(record[given]) < NEGLIGIBLE * estimate_noise(record[grip]).rms
+
+
+def _finest(signal: Floats) -> float:
+    """Return the noise of the quietest stretches in which a signal moves; infinite if none.
+
+    By fourth differences (their variance is 70 times that of white noise), over stretches so short
+    that the motion adds nothing in the quietest: the noise estimated from a whole chirp would
+    include the chirp. A motion of less than two converter steps a frame is left out, since its
+    values repeat by rounding.
+    """
+    steps = np.abs(np.diff(signal))
+    if not np.any(steps) or len(steps) < FEW_FRAMES + 4:
+        return math.inf
+    least = float(np.diff(np.unique(signal)).min())
+    slowest = sliding_window_view(steps, FEW_FRAMES + 3).min(axis=1)
+    rough = sliding_window_view(np.diff(signal, 4), FEW_FRAMES)
+    noise = np.sqrt(np.mean(rough[slowest > 1.5 * least] ** 2, axis=1) / 70.0)
+    return float(np.quantile(noise, 0.1)) if noise.size else math.inf
 
 
 def in_set_points(signal: Floats) -> bool:
