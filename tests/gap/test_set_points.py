@@ -57,7 +57,7 @@ def test_a_number_without_noise_is_a_set_point_however_fast_they_come() -> None:
         assert as_driven(rig, [Record(record.channels, data)], "column") == rig
     times = np.arange(3000) / 50.0
     chirp = 0.3 * np.sin(2.0 * np.pi * times * (0.1 + 7.0 * times / times[-1]))
-    swept = servo(chirp)  # its own motion reaches 14 Hz, which a noise of all frames would include
+    swept = servo(chirp)  # to 14 Hz: noise estimated over all frames includes it
     assert as_driven(rig, [swept], "column") == servo_rig()
     hosted = np.column_stack((record.data, np.full(len(POINTS), 1000.0)))
     host = Record((*record.channels, "column_gradient_N_per_m"), hosted)

@@ -83,16 +83,16 @@ def _made(record: Record, control: ControlName) -> bool:
     given, grip = channel(control, "computed"), channel(control, "deflection")
     if any(name in record for name in others) or not (given in record and grip in record):
         return False
-    return _finest(record[given]) < NEGLIGIBLE * estimate_noise(record[grip]).rms
+    return _estimate_quietest_noise(record[given]) < NEGLIGIBLE * estimate_noise(record[grip]).rms
 
 
-def _finest(signal: Floats) -> float:
-    """Return the noise of the quietest stretches in which a signal moves; infinite if none.
+def _estimate_quietest_noise(signal: Floats) -> float:
+    """Return the rms noise of the quietest stretches in which a signal moves; infinite if none.
 
-    By fourth differences (their variance is 70 times that of white noise), over stretches so short
-    that the motion adds nothing in the quietest: the noise estimated from a whole chirp would
-    include the chirp. A motion of less than two converter steps a frame is left out, since its
-    values repeat by rounding.
+    Fourth differences have 70 times the variance of white noise. In the quietest short stretches
+    the motion adds almost nothing to them. Over all frames of a chirp the estimate would include
+    the chirp. Motion slower than two converter steps a frame is left out, since its values repeat
+    by rounding.
     """
     steps = np.abs(np.diff(signal))
     if not np.any(steps) or len(steps) < FEW_FRAMES + 4:
