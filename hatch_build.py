@@ -25,6 +25,16 @@ write_machine_code(Path(sys.argv[1]))
 """
 
 
+def _environment(root: str, cache: str) -> dict[str, str]:
+    """Return the environment of the compiling process, which finds what the build has installed.
+
+    pip has it in a folder that only this process's path names. Numba's cache would be written into
+    the sources.
+    """
+    path = os.pathsep.join([root, *filter(None, sys.path)])
+    return {**os.environ, "PYTHONPATH": path, "NUMBA_CACHE_DIR": cache}
+
+
 class MachineCode(BuildHookInterface[Any]):
     """Compiles the kernels that every flight needs, and includes them as data."""
 
@@ -39,11 +49,11 @@ class MachineCode(BuildHookInterface[Any]):
             return
         self._folder = tempfile.TemporaryDirectory()
         place = self._folder.name
-        # Numba's cache would be written into the sources.
-        environment = {**os.environ, "PYTHONPATH": self.root, "NUMBA_CACHE_DIR": place}
         self.app.display_info("compiling the physics…")
         words = [sys.executable, "-c", _WRITE, place]
-        done = subprocess.run(words, env=environment, capture_output=True, text=True, check=False)
+        done = subprocess.run(
+            words, env=_environment(self.root, place), capture_output=True, text=True, check=False
+        )
         if done.returncode:
             last = done.stderr.strip().splitlines()[-1:]
             self.app.display_warning(f"without machine code, compiled at first start: {last}")

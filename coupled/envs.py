@@ -8,7 +8,9 @@ The package `gymnasium` is that of the extra `coupled[gym]`.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
+from numbers import Real
 from typing import Any, SupportsFloat
 
 import numpy as np
@@ -18,6 +20,7 @@ from coupled.api.sessions import Session
 from coupled.arguments import checks_itself, public
 from coupled.errors import InputError, nearest
 from coupled.flight.manoeuvre import Configuration, Manoeuvre
+from coupled.flight.pilot.base import STRONGEST
 from coupled.flight.state import State
 from coupled.record.channels import ATTITUDE, ControlName
 from coupled.rig.rig import Rig
@@ -30,6 +33,8 @@ except ImportError:
     raise InputError("coupled.envs", "", "needs gymnasium: pip install 'coupled[gym]'") from None
 
 NAME = "coupled/Loader-v0"
+_ENV = "coupled.LoaderEnv"
+_MOST_FRAMES = 10_000  # of a step, over a minute
 _STEPS = 400  # of an episode, after which it is truncated
 Floats = NDArray[np.float64]
 Stepped = tuple[Floats, SupportsFloat, bool, bool, dict[str, Any]]
@@ -75,29 +80,38 @@ class LoaderEnv(gymnasium.Env[Floats, Floats]):
         frames: int = 6,
         terms: Mapping[str, Any] | None = None,
     ) -> None:
-        for key, value in {"force_limit_N": force_limit_N, "frames": frames}.items():
-            if not 0.0 < value < float("inf"):
-                raise InputError("coupled.LoaderEnv", key, f"is {value:g}; give more than 0")
-        self._session = Session(rig, configuration=configuration, **dict(terms or {}))
-        known = list(self._session.rig.controls)
-        self._controls = list(known if controls is None else controls)
+        limits = {"force_limit_N": (force_limit_N, STRONGEST), "frames": (frames, _MOST_FRAMES)}
+        for key, (value, most) in limits.items():
+            if not 0.0 < value <= most:
+                problem = f"is {value!r:.40}; give more than 0, at most {most:g}"
+                raise InputError(_ENV, key, problem)
+        if not math.isfinite(change_rad):
+            raise InputError(_ENV, "change_rad", f"is {change_rad}; give a number")
+        given = dict(terms or {})
+        if "configuration" in given:
+            raise InputError(_ENV, "terms.configuration", "is an option itself; give it there")
+        self._session = Session(rig, configuration=configuration, **given)
+        known, free = self._session.rig.controls, self._session.controls
+        self._controls = list(dict.fromkeys(free if controls is None else controls))
         for control in self._controls:
-            if control not in known:
-                problem = f"the rig has no {control}; {nearest(control, known)}"
-                raise InputError("coupled.LoaderEnv", "controls", problem)
+            if control not in free:
+                problem = "has a pilot" if control in known else f"the rig has no {control}"
+                raise InputError(_ENV, "controls", f"{problem}; {nearest(control, free)}")
         if not self._controls:
-            raise InputError("coupled.LoaderEnv", "controls", "needs at least one")
+            raise InputError(_ENV, "controls", "needs at least one without a pilot")
         state = self._session.state
         self.observed = tuple(_usual(state, self._controls) if observed is None else observed)
+        if not self.observed:
+            raise InputError(_ENV, "observed", "needs at least one channel")
         for channel in self.observed:
             state[channel]  # raises InputError for an unknown one
         self._limit_N, self._frames = force_limit_N, frames
         self._angle, self._change_rad = ATTITUDE[self._controls[0]], change_rad
         if reward is None and self._angle not in state:
             problem = f"is needed: {self._session.rig.name} has no aircraft whose attitude to hold"
-            raise InputError("coupled.LoaderEnv", "reward", problem)
+            raise InputError(_ENV, "reward", problem)
         self._reward = reward or self._task
-        self._started_rad = 0.0
+        self._started_rad = state.as_dict().get(self._angle, 0.0)
         moved, seen = (len(self._controls),), (len(self.observed),)
         self.action_space = spaces.Box(-1.0, 1.0, moved, np.float64)
         self.observation_space = spaces.Box(-LARGEST, LARGEST, seen, np.float64)
@@ -133,7 +147,7 @@ class LoaderEnv(gymnasium.Env[Floats, Floats]):
             share = np.zeros(0)
         if share.shape != (len(self._controls),) or not np.all(np.abs(share) <= 1.0):
             problem = f"is {action!r:.60}; give {len(self._controls)} from -1 to 1"
-            raise InputError("coupled.LoaderEnv", "action", problem)
+            raise InputError(_ENV, "action", problem)
         session, forces = self._session, (self._limit_N * share).tolist()
         named: dict[str, Any] = {
             f"{name}_force_N": force for name, force in zip(self._controls, forces, strict=True)
@@ -145,8 +159,10 @@ class LoaderEnv(gymnasium.Env[Floats, Floats]):
                 break
         ended = session.ended_early
         information = {"ended_early": ended} if ended else {}
-        reward = float(self._reward(state, share))
-        return self._seen(state), reward, bool(ended), False, information
+        reward = self._reward(state, share)
+        if not isinstance(reward, Real) or not math.isfinite(reward):
+            raise InputError(_ENV, "reward", f"returned {reward!r:.60}; return a number")
+        return self._seen(state), float(reward), bool(ended), False, information
 
     def close(self) -> None:
         """End the flight."""

@@ -39,7 +39,8 @@ def shown_value(value: object) -> str:
     if isinstance(value, int) and abs(value) > 10**300:
         return "an integer of hundreds of digits"
     text = f"of type {type(value).__name__}"
-    if isinstance(value, (bool, int, float, str, list, tuple, dict, set, type(None))):
+    plain = isinstance(value, (bool, int, float, str, list, tuple, dict, set, type(None)))
+    if plain or getattr(value, "shape", None) == ():  # a number of numpy
         with suppress(ValueError):  # of an integer of thousands of digits, which Python writes not
             text = repr(value)
     return text if len(text) <= LONGEST_VALUE else text[: LONGEST_VALUE - 3] + "..."

@@ -60,7 +60,9 @@ def find(name: str, shipped: dict[str, Path], kind: str, beside: Path | None = N
     if "/" not in name and not name.endswith(".toml"):
         if name in shipped:
             return shipped[name]
-        raise InputError(name, "", f"is no shipped {kind}; {nearest(name, shipped)}")
+        kinds = {"rig": shipped_rigs(), "run": shipped_runs(), "sweep": shipped_sweeps()}
+        others = [f"it is a shipped {other}" for other, files in kinds.items() if name in files]
+        raise InputError(name, "", f"is no shipped {kind}; {(*others, nearest(name, shipped))[0]}")
     for folder in ([beside] if beside else []) + [Path()]:
         try:
             if (folder / name).is_file():

@@ -44,7 +44,7 @@ class Given(Section):
             needed = [key for key, info in type(self).model_fields.items() if info.is_required()]
             first = next(iter(needed or keys))
             raise TypeError(f"{name}: takes its values by name; give {first}=…")
-        plain = {key: _plain(value) for key, value in values.items()}
+        plain = {key: plain_value(value) for key, value in values.items()}
         known_keys(plain, keys, name, "")
         for key, value in plain.items():
             _refuse_unreal(value, name, key)
@@ -60,8 +60,10 @@ class Lenient(Section):
     model_config = ConfigDict(extra="ignore")
 
 
-def _plain(value: Any) -> Any:
-    """Return an array or a number of numpy, or a tuple, as a file would give it."""
+def plain_value(value: Any) -> Any:
+    """Return an array or a number of numpy, a tuple or a table, as a file would give it."""
+    if isinstance(value, Mapping):
+        return {key: plain_value(each) for key, each in value.items()}
     if hasattr(value, "tolist"):
         return value.tolist()
     return list(value) if isinstance(value, tuple) else value

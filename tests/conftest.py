@@ -1,9 +1,8 @@
-"""Settings of all tests: the number of workers, and the folder of the compiled physics."""
+"""Settings of all tests: the number of workers, and one thread for each."""
 
 from __future__ import annotations
 
 import os
-from pathlib import Path
 
 import pytest
 from hypothesis import settings
@@ -15,9 +14,6 @@ settings.load_profile("coupled")
 
 WORKER = os.environ.get("PYTEST_XDIST_WORKER")
 if WORKER:
-    # Two processes that compile into one cache at once can mistake each other's code.
-    kept = Path(__file__).parents[1] / ".pytest_cache" / "kernels" / WORKER
-    os.environ.setdefault("NUMBA_CACHE_DIR", str(kept))
     # A worker has one core: threads of linear algebra would fight for it.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
@@ -33,4 +29,5 @@ def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
     measuring = config.option.markexpr == "bench"
     if chosen or measuring or config.option.keyword or config.option.capture == "no":
         return 0
-    return min(MOST_WORKERS, len(os.sched_getaffinity(0)))
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    return min(MOST_WORKERS, cores or 1)

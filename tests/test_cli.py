@@ -17,7 +17,7 @@ from coupled.cli.order import PANELS, name_of
 from coupled.plots.saving import save
 from coupled.record.channels import record_channels
 from coupled.record.record import read_record
-from coupled.resources import shipped_sweeps
+from coupled.resources import shipped_rigs, shipped_sweeps
 from tests.support.commands import ROOT, coupled, coupled_anew, files
 from tests.support.runs import SHORT
 
@@ -189,6 +189,8 @@ def test_a_flight_that_ends_early_says_so_and_exits_with_1(folder: Path) -> None
         (["compare", "nothing"], "nothing: is no shipped run; known: appendix-c"),
         (["compare", "nothing.toml"], "nothing.toml: there is no such run file"),
         (["compare", "short.toml", "--figure", "a.bmp"], "a.bmp: a figure ends in .png"),
+        (["compare", str(shipped_rigs()["t37"])], "t37.toml: is a rig file; give a run"),
+        (["document", "short.toml"], "short.toml: is a run file; give a rig"),
         (["fly", "short.toml", "-o", "a.xls"], "a.xls: a record ends in .csv or .parquet"),
         (["fly", "short.toml", "--case", "x"], "--case: no case 'x'; known: short"),
         (["compare", "short.toml", "--case", "x"], "--case: no case 'x'; known: short"),

@@ -100,6 +100,12 @@ def test_gymnasium_truncates_an_episode() -> None:
         ({"controls": ["wheel"]}, "controls: the rig has no wheel"),
         ({"observed": ["pitch_deg"]}, "no channel pitch_deg; did you mean"),
         ({"frames": 0}, "frames: is 0; give more than 0"),
+        ({"frames": 10**9}, r"frames: is 1e\+09; give more than 0, at most 10000"),
+        ({"force_limit_N": 6000.0}, "force_limit_N: is 6000; give more than 0, at most 5000"),
+        ({"change_rad": np.nan}, "change_rad: is nan; give a number"),
+        ({"observed": []}, "observed: needs at least one channel"),
+        ({"terms": {"configuration": "rigid"}}, "terms.configuration: is an option itself"),
+        ({"terms": {"column": lambda state: 1.0}}, "controls: needs at least one without a pilot"),
         ({"force_limit_N": "x"}, "force_limit_N: is 'x'; give a number"),
         ({"configuration": "soft"}, "configuration: is 'soft'"),
         ({"controls": []}, "controls: needs at least one"),
@@ -108,6 +114,22 @@ def test_gymnasium_truncates_an_episode() -> None:
 def test_a_wrong_option_is_one_line(options: dict[str, Any], said: str) -> None:
     with pytest.raises(coupled.InputError, match=said):
         LoaderEnv(COLUMN, **options)
+
+
+@pytest.mark.parametrize("value", [None, np.nan, "1"])
+def test_a_reward_that_is_no_number_is_one_line(value: Any) -> None:
+    env = LoaderEnv(COLUMN, reward=lambda state, action: value)
+    env.reset(seed=1)
+    with pytest.raises(coupled.InputError, match=r"reward: returned .*; return a number"):
+        env.step([0.1])
+
+
+def test_an_action_moves_the_controls_without_a_pilot_each_once() -> None:
+    held: dict[str, Any] = {"column": lambda state: 0.0}
+    assert LoaderEnv("c172p", terms=held).action_space.shape == (2,)
+    with pytest.raises(coupled.InputError, match="controls: has a pilot; known"):
+        LoaderEnv("c172p", controls=["column"], terms=held)
+    assert LoaderEnv("c172p", controls=["wheel", "wheel"]).action_space.shape == (1,)
 
 
 @pytest.mark.parametrize("action", [[2.0], [0.1, 0.1], "x", [np.nan], None])

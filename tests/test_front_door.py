@@ -184,6 +184,7 @@ def test_a_comparison_is_asked_by_configuration_and_case() -> None:
         (lambda: fly(column=PULL, dynamic_pressure_Pa=9.0), "t37 has an aircraft, which gives q̄"),
         (lambda: fly(column=PULL, wind={"time_s": [0.0]}), "wind.along_m_per_s: is missing"),
         (lambda: fly(column=PULL, record_properties=["no/such"]), "has no property 'no/such'"),
+        (lambda: fly(column=PULL, record_properties=["a/b", "a/b"]), "names a/b twice"),
         (
             lambda: fly(column=coupled.ForceTable(time_s=[0.0, 0.0], force_N=[0.0, 1.0])),
             "pilot.column.time_s: must rise: row 1 does not",
@@ -194,6 +195,7 @@ def test_a_comparison_is_asked_by_configuration_and_case() -> None:
         ),
         (lambda: fly(column=coupled.ForceTable()), "needs a file, or time_s and force_N"),
         (lambda: fly(column=coupled.ForceTable(file="no/such.csv")), "no/such.csv: cannot be read"),
+        (lambda: fly(what="pull-up-t37"), "is no shipped rig; it is a shipped run"),
         (lambda: fly(what=case(), column=PULL), "is said by the manoeuvre itself"),
         (lambda: coupled.diagnose("t37", []), "records: needs at least one"),
         (

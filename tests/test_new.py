@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from coupled import load_rig, new_rig
+from coupled.authority.firstrun import first_run
 from coupled.calibration.form import starting_form
 from coupled.calibration.readingsfile import read_readings
 from coupled.campaign.plan import read_plan
@@ -63,6 +64,18 @@ def test_a_rig_that_no_run_suits_is_refused_and_nothing_written(tmp_path: Path) 
     assert done.returncode == 2
     assert "controls.column.drive: a setpoint has no loader that a force moves" in done.stderr
     assert files(tmp_path) == {"mine.toml"}
+
+
+def test_a_run_without_a_speed_that_trims_is_refused_with_the_reason(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def refuse(*given: object) -> None:
+        raise InputError("t37", "flight.calibrated_airspeed_m_per_s", "T37 does not trim level")
+
+    monkeypatch.setattr("coupled.authority.firstrun.speed_range", lambda *given: (40.0, 60.0))
+    monkeypatch.setattr("coupled.authority.firstrun.fly_and_judge", refuse)
+    with pytest.raises(InputError, match="calibrated_airspeed_m_per_s: T37 does not trim level"):
+        first_run(load_rig("t37"), "column", "t37", "pull")
 
 
 def test_a_rig_may_be_an_aircraft_alone(tmp_path: Path) -> None:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import importlib
 import ntpath
 import os
 import re
+import subprocess
 import sys
 import tomllib
 from pathlib import Path
@@ -73,3 +75,17 @@ def test_windows_has_no_more_workers_than_it_can_wait_for(monkeypatch: pytest.Mo
     assert parallel.cores(200) == 200
     monkeypatch.setattr(sys, "platform", "win32")
     assert parallel.cores(200) == 61
+
+
+def test_a_wheel_s_physics_are_compiled_with_what_the_build_installed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """pip installs it in a folder of its own, which no other process has on its path."""
+    (tmp_path / "only_of_the_build.py").write_text("", encoding="utf-8")
+    monkeypatch.syspath_prepend(str(ROOT))
+    hook = importlib.import_module("hatch_build")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    words = [sys.executable, "-c", "import only_of_the_build, coupled; print(coupled.__file__)"]
+    environment = hook._environment(str(ROOT), str(tmp_path))
+    done = subprocess.run(words, env=environment, cwd=tmp_path, capture_output=True, check=True)
+    assert Path(done.stdout.decode().strip()).parent == ROOT / "coupled"

@@ -19,7 +19,7 @@ from coupled.flight.pilot.own import Law, as_pilot
 from coupled.flight.runfile import read_run
 from coupled.record.channels import CONTROL_NAMES, ControlName
 from coupled.rig.rig import Rig
-from coupled.schema import known_keys
+from coupled.schema import known_keys, plain_value
 
 Path = str | PathLike[str]
 Gradients = Law | Mapping[ControlName, Law]
@@ -176,15 +176,17 @@ def manoeuvre_of(
     name = terms.get("name", "manoeuvre")
     words = (*CONTROL_NAMES, "gradient", "duration_s", *Terms.__annotations__)
     known_keys(dict(terms), dict.fromkeys(words), name, "")
+    rig = what if isinstance(what, Rig) else load_rig(what)
     if duration_s is None:
-        raise InputError(name, "duration_s", "is missing")
+        raise InputError(name, "duration_s", "is missing; give the length of the flight")
     given: Mapping[str, object] = terms
-    tables = {key: _plain(given[key]) for key in Conditions.model_fields if key in given}
+    tables = {key: plain_value(given[key]) for key in Conditions.model_fields if key in given}
     build_conditions(tables, name)
-    pressure = terms.get("dynamic_pressure_Pa")
+    pressure = plain_value(terms.get("dynamic_pressure_Pa"))
+    if pressure is None and rig.flight is None:
+        raise InputError(name, "dynamic_pressure_Pa", f"is missing: {rig.name} has no aircraft")
     if isinstance(pressure, (int, float)):
         pressure = PressureProfile(time_s=[0.0], dynamic_pressure_Pa=[float(pressure)])
-    rig = what if isinstance(what, Rig) else load_rig(what)
     return Manoeuvre(
         rig,
         pilots,
@@ -207,13 +209,6 @@ def _laws(given: Gradients | None, rig: Rig, name: str) -> Mapping[ControlName, 
         problem = f"is one law for {len(others) + 1} controls; give a table, as {{{first!r}: law}}"
         raise InputError(name, "gradient", problem)
     return {first: given}
-
-
-def _plain(table: Any) -> Any:
-    """Return a table as a run file gives it: of dictionaries and lists."""
-    if isinstance(table, Mapping):
-        return {key: _plain(value) for key, value in table.items()}
-    return table.tolist() if hasattr(table, "tolist") else table
 
 
 def _alone(

@@ -6,7 +6,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, replace
 from functools import partial
 from numbers import Real
-from typing import Any, Unpack
+from typing import Any, Never, Unpack
+
+import numpy as np
 
 from coupled.api.flights import Gradients, Path, Terms, manoeuvre_of, pilots_of
 from coupled.arguments import checks_itself, public
@@ -24,10 +26,12 @@ from coupled.record.record import EndedEarly, Record
 from coupled.rig.rig import Rig
 from coupled.rig.serving import check_service, set_service
 from coupled.rig.switches import Switches
+from coupled.schema import known_keys
 
 _LONGEST_s = 7200.0  # of a flight, as of a run
 _FIRST_s = 60.0  # length of the arrays at first; to double them takes some 200 steps
 _NAME = "coupled.Session"
+_FORCES = dict.fromkeys(f"{control}_force_N" for control in CONTROL_NAMES)
 _CLOSED = "the session is closed; make a new one"
 
 
@@ -50,6 +54,13 @@ class Session:
     Record(61 rows, 0.508333 s at 120 Hz; 46 channels: time_s, column_force_N, column_computed_m, …)
     """
 
+    # So that a mistyped switch, as `session.deflection_corection = True`, is refused.
+    __slots__ = (
+        *("__weakref__", "_advance", "_again", "_begin", "_begun", "_capacity", "_closed", "_end"),
+        *("_ended", "_flight", "_free", "_has_own", "_k", "_kept", "_own", "_places", "_read"),
+        *("_refusal", "_services", "_state", "_switches"),
+    )
+
     def __init__(
         self,
         what: Manoeuvre | Rig | Path,
@@ -61,6 +72,8 @@ class Session:
         configuration: Configuration | None = None,
         **terms: Unpack[Terms],
     ) -> None:
+        if "duration_s" in terms:
+            raise InputError(_NAME, "duration_s", "a session has none: step it as long as wanted")
         pilots = pilots_of(column, wheel, pedals)
         if isinstance(what, Manoeuvre):
             given = manoeuvre_of(what, pilots, None, gradient, terms)
@@ -113,6 +126,9 @@ class Session:
     def __enter__(self) -> Session:
         return self
 
+    def __reduce__(self) -> Never:
+        raise TypeError("a coupled.Session cannot be copied or pickled; make another one")
+
     def __exit__(self, *raised: object) -> None:
         self.close()
 
@@ -135,6 +151,11 @@ class Session:
     def rig(self) -> Rig:
         """The rig with its present switches."""
         return self._switches.rig
+
+    @property
+    def controls(self) -> tuple[ControlName, ...]:
+        """The controls without a pilot, whose force `step` takes."""
+        return tuple(self._free)
 
     @property
     def record(self) -> Record:
@@ -176,6 +197,7 @@ class Session:
         column_force_N: float | None = None,
         wheel_force_N: float | None = None,
         pedals_force_N: float | None = None,
+        **unknown: Never,
     ) -> State:
         """Fly one frame and return the state at its end.
 
@@ -191,7 +213,9 @@ class Session:
             or k + 1 == self._capacity
             or wheel_force_N is not None
             or pedals_force_N is not None
+            or unknown
         ):
+            known_keys(unknown, _FORCES, _NAME, "")
             return self._step((column_force_N, wheel_force_N, pedals_force_N))
         try:
             why = advance(k, column_force_N)
@@ -265,9 +289,9 @@ class Session:
         """Return to trim, with the rig as it was at first, and return the state there.
 
         `seed` is that of the next flight's noise, turbulence and gusts; without it, the session's.
-        The aircraft of a 737, B747, T-37 or F-16 is reset, if nothing but its commands acts on it.
-        Others are loaded anew, without a leak: JSBSim's reset does not restore the hysteresis of a
-        stall, as of a c172p, or the position of a kinematic component, as of an awjsra's nozzles.
+        A 737, B747, T-37, F-16 or c172p is reset, if nothing but its commands acts on it. Others
+        are loaded anew, without a leak: JSBSim's reset does not restore the position of a kinematic
+        component, as of an awjsra's nozzles.
         """
         self._check_open("reset")
         self._start(self._begun if seed is None else replace(self._begun, seed=seed))
@@ -307,11 +331,11 @@ class Session:
             del self._flight, self._begin, self._end, self._again, self._own
 
     def _correct(self, which: str, on: bool) -> None:
-        if not isinstance(on, bool):
+        if not isinstance(on, (bool, np.bool_)):
             problem = f"is {shown_value(on)}; give True or False"
             raise InputError(_NAME, f"{which}_correction", problem)
         for control in self.rig.controls:
-            self.set_switch(control, which, on)
+            self.set_switch(control, which, bool(on))
 
     def _change(self, change: Callable[[], None]) -> None:
         """Make a change of the controls at this frame, and take the state with it."""

@@ -17,7 +17,7 @@ import numpy as np
 from coupled.authority.compare import fly_and_judge
 from coupled.authority.held import breakaway_force
 from coupled.authority.outcome import Flight
-from coupled.errors import InputError
+from coupled.errors import InputError, collected
 from coupled.flight.manoeuvre import Manoeuvre, PressureProfile
 from coupled.flight.pilot import Step
 from coupled.record.channels import RATE, ControlName
@@ -60,13 +60,16 @@ def first_run(
         raise InputError(rig.name, f"controls.{control}.drive", problem)
     said = progress or (lambda what, done, total: None)
     tries = _tries(rig, control, said)
-    cases = []
+    cases, refused = [], list[InputError]()
     for done, (label, speed, pressure) in enumerate(tries):
         said(f"flying {label}", done, len(tries))
-        case = _case(rig, control, label, speed, pressure)
-        if case is not None:
-            cases.append(case)
+        with collected(refused):  # no trim at this speed, though at one found by steps
+            case = _case(rig, control, label, speed, pressure)
+            if case is not None:
+                cases.append(case)
     if not cases:
+        if refused:
+            raise refused[0]
         what = "speeds" if rig.flight is not None else "forces"
         raise InputError(rig.name, "", f"no pull of {_DURATION_s:g} s flies at any of its {what}")
     return "\n".join([*_head(rig, control, word, name, cases), *_expectations(control, cases), ""])
@@ -107,10 +110,7 @@ def _case(
         for configuration in ("rigid", "compensated"):
             pull = Step(force_N=rounded, start_s=_START_s, duration_s=_HELD_s)
             flown = Manoeuvre(there, {control: pull}, _DURATION_s, bench=bench, label=label)
-            try:
-                flights.append(fly_and_judge(flown.configured(configuration), configuration))
-            except InputError:  # no trim at this speed, though at one found by steps
-                return None
+            flights.append(fly_and_judge(flown.configured(configuration), configuration))
             if flights[-1].ended_early:
                 break
         else:

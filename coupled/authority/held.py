@@ -45,6 +45,7 @@ def true_deflection(rig: Rig, control: ControlName, record: Record) -> Floats:
     """Return the deflection δ at the grip in d, from the transducer's reading: eq. (15)."""
     data = rig.controls[control]
     read = record[channel(control, "deflection")] - data.sensing.deflection_zero
+    read = read - data.sensing.grip_load_curve.at(record[channel(control, "force")])
     read = data.sensing.grip_curve.inverse(read)
     if data.loader.arc_geometry:
         read = data.length * np.arcsin(np.clip(read / data.length, -1.0, 1.0))

@@ -5,15 +5,17 @@ the columns:
 
     deflection_…, force_…   and, if noted,   dynamic_pressure_…, direction, surface_…
 
-`direction` is `out` from neutral or `back` to it. Rows without it are the mean force of both
-directions, and the friction is that of the specification. Nothing is interpolated between rows: a
+`direction` is `out` from neutral or `back` to it. Without it, rows in the order of a sweep out and
+back have the direction of the motion. Other rows are the mean force of both directions, and the
+friction is that of the specification. Nothing is interpolated between rows: a
 check uses the deflections, sides and directions that were read.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -36,6 +38,7 @@ SURFACES = {"surface_deg": DEGREE_rad, "surface_rad": 1.0}
 DIRECTION, REMARK = "direction", "remark"
 DIRECTIONS = {"out": 1.0, "back": -1.0}
 MOST_PRESSURES = 8
+TURNS = 0.02  # of the range of deflections: a smaller reversal is noise of a reading
 BEYOND = 1.02  # of the travel: the largest deflection of a reading
 NOTHING = SweepLeg(np.empty(0), np.empty(0), np.empty(0), read=True)
 
@@ -71,7 +74,7 @@ def read_aircraft_data(
     """
     rows, found = read_rows(path, control, surface_rad), {}
     for pressure in sorted({row.pressure for row in rows}):
-        here = [row for row in rows if row.pressure == pressure]
+        here = _directed([row for row in rows if row.pressure == pressure])
         found[pressure] = _legs(path, here, specified, surface_rad or np.nan)
     if len(found) > MOST_PRESSURES:
         problem = f"is of {len(found)} dynamic pressures; give {MOST_PRESSURES} at most"
@@ -143,6 +146,43 @@ def _row(
     surface = abs(value.get("surface", np.nan))
     way = DIRECTIONS.get(word, 0.0)
     return Row(number, pressure, value["deflection"], value["force"], way, surface)
+
+
+def _directed(rows: list[Row]) -> list[Row]:
+    """Return the rows of a sweep with their directions; other rows as they are.
+
+    Without directions it is a sweep if a side has readings on the way out and on the way back.
+    Those at turning points have no direction, and are left out.
+    """
+    if any(row.direction for row in rows):
+        return rows
+    deflection = np.array([row.deflection for row in rows])
+    outward = motion_of(deflection) * np.sign(deflection)
+    sides = [outward[deflection * side > 0.0] for side in (1.0, -1.0)]
+    ways = [min(np.count_nonzero(ours > 0.0), np.count_nonzero(ours < 0.0)) for ours in sides]
+    if max(ways) < 2:
+        return rows
+    return [replace(row, direction=w) for row, w in zip(rows, outward.tolist(), strict=True) if w]
+
+
+def motion_of(deflection: Floats) -> Floats:
+    """Return the direction of the motion at each reading, 0 until it has left a turning point."""
+    least = TURNS * float(np.ptp(deflection))
+    turns, extreme, way = [0], 0, 0.0
+    for k, value in enumerate(deflection):
+        away = value - deflection[extreme]
+        if way * away > 0.0 or (way == 0.0 and abs(away) > least):
+            way = way or float(np.sign(away))
+            extreme = k
+        elif way * away < -least:
+            turns.append(extreme)
+            way, extreme = -way, k
+    turns.append(len(deflection) - 1)
+    motion = np.zeros(len(deflection))
+    for begun, ended in pairwise(turns):
+        gone = deflection[begun + 1 : ended] - deflection[begun]
+        motion[begun + 1 : ended] = np.where(np.abs(gone) > least, np.sign(gone), 0.0)
+    return motion
 
 
 def _legs(

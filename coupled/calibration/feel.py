@@ -24,14 +24,13 @@ from numpy.typing import NDArray
 from scipy.optimize import nnls
 from scipy.stats import t as student
 
-from coupled.calibration.aircraftdata import read_rows
+from coupled.calibration.aircraftdata import motion_of, read_rows
 from coupled.errors import InputError
 from coupled.record.channels import CONTROL_NAMES, ControlName, channel, unit_of
 from coupled.record.record import Record
 
 Floats = NDArray[np.float64]
 NEUTRAL = 0.01  # of the largest deflection: readings nearer to neutral are not used
-TURNS = 0.02  # of the range of deflections: a smaller reversal is noise of a reading
 GRID = 12  # nodes on a side to begin with
 MOVES = (0.5, 0.25, 0.125, 0.0625)  # of the grid's step
 EXACT = 1e-9  # of the largest force: a smaller residual is rounding
@@ -98,7 +97,7 @@ def read_sweep(path: Path, control: ControlName) -> Sweep:
     else:
         motion = np.zeros(len(rows))
         for q in np.unique(pressure):
-            motion[pressure == q] = _motion(deflection[pressure == q])
+            motion[pressure == q] = motion_of(deflection[pressure == q])
     found = Sweep(deflection, force, pressure, motion)
     _check(path, [row.number for row in rows], found)
     return found
@@ -145,30 +144,10 @@ def sweep_of_record(record: Record, control: ControlName, file: Path) -> Sweep:
     level = np.full(count, float(np.mean(pressure)))
     # A mean across neutral holds the breakout of both sides, and is not used.
     one_side = [np.min(record[name][rows]) * np.max(record[name][rows]) > 0.0 for rows in parts]
-    motion = np.where(one_side, _motion(deflection), 0.0)
+    motion = np.where(one_side, motion_of(deflection), 0.0)
     found = Sweep(deflection, force, level, motion)
     _check(file, [int(rows[0]) + 2 for rows in parts], found)
     return found
-
-
-def _motion(deflection: Floats) -> Floats:
-    """Return the direction of the motion at each reading, 0 until it has left a turning point."""
-    least = TURNS * float(np.ptp(deflection))
-    turns, extreme, way = [0], 0, 0.0
-    for k, value in enumerate(deflection):
-        away = value - deflection[extreme]
-        if way * away > 0.0 or (way == 0.0 and abs(away) > least):
-            way = way or float(np.sign(away))
-            extreme = k
-        elif way * away < -least:
-            turns.append(extreme)
-            way, extreme = -way, k
-    turns.append(len(deflection) - 1)
-    motion = np.zeros(len(deflection))
-    for begun, ended in pairwise(turns):
-        gone = deflection[begun + 1 : ended] - deflection[begun]
-        motion[begun + 1 : ended] = np.where(np.abs(gone) > least, np.sign(gone), 0.0)
-    return motion
 
 
 def _check(path: Path, numbers: Sequence[int], sweep: Sweep) -> None:
@@ -304,6 +283,9 @@ def feel_text(feel: Feel, control: ControlName, source: str) -> str:
     """Return the keys of a rig file: loader's breakout and friction, and the schedule."""
     d = unit_of(control)
 
+    def interval(half_width_N: float) -> str:
+        return f"  # ± {half_width_N:.2g}, 95 %" if half_width_N > 0.0 else ""
+
     def listed(values: Floats) -> str:
         return "[" + ", ".join(repr(float(f"{value:.5g}") + 0.0) for value in values) + "]"
 
@@ -312,8 +294,8 @@ def feel_text(feel: Feel, control: ControlName, source: str) -> str:
 # The residual of the readings is {feel.rms_N:.3g} N RMS.
 
 [controls.{control}.loader]
-breakout_N = {feel.breakout_N:.4g}  # ± {feel.breakout_half_width_N:.2g}, 95 %
-friction_N = {feel.friction_N:.4g}  # ± {feel.friction_half_width_N:.2g}, 95 %
+breakout_N = {feel.breakout_N:.4g}{interval(feel.breakout_half_width_N)}
+friction_N = {feel.friction_N:.4g}{interval(feel.friction_half_width_N)}
 
 [controls.{control}.schedule]
 dynamic_pressure_Pa = {listed(feel.pressure)}

@@ -30,6 +30,7 @@ from coupled.rig.guesses import guess_note
 from coupled.units import POUND_N, DEGREE_rad, KNOT_m_per_s
 
 NOT_GIVEN = "not given"
+_ROUNDING = 1e-6  # of the tolerance: a value below it is printed as 0
 Kind = Literal["static", "release"]
 _SEA_LEVEL_kg_per_m3 = 1.225
 _STATIC = ("breakout", "force", "surface")
@@ -79,7 +80,10 @@ def check_numbers(check: ControlCheck, system: System = "si") -> tuple[str, str,
     """Return what a check measured, its reference, its tolerance, and their unit, as text."""
     unit = in_system(check.unit, system)
     values = (check.measured, check.reference, check.tolerance)
-    measured, reference, allowed = (written(unit.factor * value) for value in values)
+    least = _ROUNDING * check.tolerance
+    measured, reference, allowed = (
+        written(unit.factor * value if abs(value) > least else 0.0) for value in values
+    )
     return measured, reference, allowed, unit.unit
 
 

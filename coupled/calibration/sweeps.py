@@ -65,6 +65,8 @@ def sweep(rig: Rig, control: ControlName, pressure_Pa: float) -> History:
     turns = [0.0, TURN_s, quarter, quarter + TURN_s, 3.0 * quarter, 3.0 * quarter + TURN_s]
     side = np.interp(ends, turns, [0.0, 1.0, 1.0, -1.0, -1.0, 1.0])
     force = force + side * breakaway_force(data.loader)
+    # Without its damping's force a flat curve would be crossed late, and faster than evenly.
+    force = force + data.loader.damping * np.gradient(path, ends)
     nodes = np.interp(nodes_of(rig, frames), ends, force)
     return run_control(rig, control, nodes, np.full(frames, pressure_Pa))
 

@@ -11,8 +11,9 @@ import atexit
 import contextlib
 import gc
 import sys
+from functools import cache
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from typer.exceptions import TyperException
@@ -106,7 +107,7 @@ def main() -> None:
 def _run() -> int:
     """Return the exit code of the command that the user gave."""
     try:
-        code = app(standalone_mode=False)
+        code = _commands()(standalone_mode=False)
         if sys.stdout is not None:
             sys.stdout.flush()
         return code if isinstance(code, int) else 0
@@ -127,6 +128,12 @@ def _run() -> int:
         for each in line.split("\n"):
             say_error(each)
     return REFUSED
+
+
+@cache
+def _commands() -> Any:
+    """Return the commands with their options, collected once in a process."""
+    return typer.main.get_command(app)
 
 
 def check_cluster(workers: int | None, cluster: str) -> tuple[int, str]:

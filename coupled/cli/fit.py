@@ -83,6 +83,8 @@ def _text(fitted: NominalFit, rig_file: Path, logs: list[Path]) -> str:
     remark = f"{shown(rig_file.name)} with what was fitted to {names}.\n"
     remark += "The tolerances are halves of 95 % intervals.\n"
     remark += "".join(f"Not distinguished: {one.words}.\n" for one in fitted.alike)
+    as_filed = [number.words for number in fitted.numbers if number.half is None]
+    remark += "".join(f"{words[0].upper()}{words[1:]}.\n" for words in as_filed)
     changes = differences(read_rig(rig_file), fitted.rig)
     return edited(read_text(rig_file, "a rig file is wanted"), changes, remark)
 
@@ -98,8 +100,9 @@ def _print(fitted: NominalFit) -> None:
         say(f"not distinguished: {one.words}")
     for doubt in fitted.doubts:
         say(f"doubtful: {doubt}")
-    for key in fitted.unknown:
-        say(f"not determined by these records: {key}; it stays as filed")
+    for number in fitted.numbers:
+        if number.half is None:
+            say(number.words)
     for number in fitted.numbers:
         if number.at_bound:
             say(f"at the end of what it may be: {number.key}")

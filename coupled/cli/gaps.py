@@ -235,7 +235,7 @@ def _write_improved(
     from coupled.calibration.assumed import outdated_bends
     from coupled.files import read_text
     from coupled.gap.checks import rig_of_manifests, trimmed
-    from coupled.gap.findings.summary import change
+    from coupled.gap.findings.summary import changed
     from coupled.rig.rigedit import differences, edited
     from coupled.rig.rigfile import read_rig
     from coupled.rig.rigwrite import rig_text
@@ -250,16 +250,16 @@ def _write_improved(
     remark = f"{held} with what was found in {names}:\n{whole.summary}\n"
     improved = whole.with_curves if with_curves else whole.improved
     curves = whole.curves if with_curves else ()
-    remark += "".join(f"added: {one.key}, {one.lists} over {one.of}; no cause\n" for one in curves)
-    for effect in whole.credible if curves else whole.effects:
-        remark += "".join(f"changed: {effect.key_of(p)} {change(p)}\n" for p in effect.parameters)
-    for setting in (one for one in whole.settings if one.moved):
-        remark += f"changed: {setting.words}, within its tolerance\n"
-    remark += "".join(f"{sentence}\n" for sentence in outdated_bends(filed, improved))
     # The trim was taken from the record, and is no change of the rig file; nor is the frame rate
     # of a rig without controls.
     judged = trimmed(filed, records)[0] if filed.controls else whole.nominal
     changes = differences(judged, improved)
+    remark += "".join(f"added: {one.key}, {one.lists} over {one.of}; no cause\n" for one in curves)
+    effects, fitted_again = (whole.credible, changes) if curves else (whole.effects, {})
+    remark += "".join(f"changed: {line}\n" for line in changed(effects, fitted_again))
+    for setting in () if curves else (one for one in whole.settings if one.moved):
+        remark += f"changed: {setting.words}, within its tolerance\n"
+    remark += "".join(f"{sentence}\n" for sentence in outdated_bends(filed, improved))
     said = remark
     for key in changes:
         dotted = ".".join(key)

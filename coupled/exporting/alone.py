@@ -41,17 +41,29 @@ def given(root):
 
 
 def main():
+    if len(sys.argv) < 2:
+        sys.exit(__doc__)
     root = pathlib.Path(__file__).resolve().parent
     script = pathlib.Path(sys.argv[1])
+    if not script.is_file():
+        sys.exit(f"{script}: there is no such file")
     names = sys.argv[2:] or ["simulation/sim-time-sec", *given(root)]
     jsbsim.FGJSBBase().debug_lvl = 0
     fdm = jsbsim.FGFDMExec(str(root))
-    if not fdm.load_script(str(script if script.is_absolute() else pathlib.Path.cwd() / script)):
+    try:
+        loaded = fdm.load_script(str(script.absolute()))
+    except jsbsim.BaseError as error:
+        sys.exit(f"{script} does not load: {error}")
+    if not loaded:
         sys.exit(f"{script} does not load")
     fdm.disable_input()
     fdm.disable_output()
     if not fdm.run_ic():
         sys.exit(f"{script} does not start")
+    known = {line.split(" (")[0] for line in fdm.query_property_catalog("").splitlines()}
+    known |= {name.replace("[0]", "") for name in known}
+    if unknown := [name for name in names if name.replace("[0]", "") not in known]:
+        sys.exit(f"the aircraft has no property {unknown[0]}")
     print(",".join(names))
     going = True
     while going:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from coupled.exporting.curve import add_curve, has_curve, sloped
+from coupled.exporting.curve import add_curve, sloped
 from coupled.exporting.expression import (
     Expr,
     below,
@@ -49,7 +49,7 @@ def add_schedule(made: Made) -> None:
         lagged = before + made.frame_gain(schedule.pressure_lag) * (got - before)
         got = either(made.own("live"), lagged, got)
     at = made.once_a_frame("schedule/pressure-Pa", got)
-    if has_curve(made):
+    if schedule.curved:
         return
     tables = {f"gradient-N_per_{d}": schedule.total_gradient}
     if schedule.second_gradient is not None:
@@ -78,7 +78,7 @@ def add_modification(made: Made, steps: dict[str, tuple[float, float]]) -> None:
     def sent(delta: Expr) -> Expr:
         return converted(delta, *steps["gradient"]) if hybrid else delta
 
-    if has_curve(made):
+    if schedule.curved:
         add_curve(made, scale, sent)
         _add_offset(made)
         return

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from coupled.exporting.curve import curve_force, curve_slope, has_curve
+from coupled.exporting.curve import curve_force, curve_slope
 from coupled.exporting.expression import (
     Expr,
     either,
@@ -53,7 +53,7 @@ def held(made: Made) -> bool:
 def modifying(made: Made, at: Expr, *, smooth: bool) -> Expr:
     """Return F_mod at δc = `at` by the host's last output; `smooth` without F_extra."""
     own, schedule = made.own, made.control.schedule
-    force = curve_force(made, at) if has_curve(made) else own("host/first") * at
+    force = curve_force(made, at) if made.control.schedule.curved else own("host/first") * at
     if made.control.loader.multiplier == "hybrid":
         force = force + own("host/offset") if _has_offset(made) else force
     if schedule.break_deflection > 0.0:
@@ -135,7 +135,7 @@ def _spring(made: Made, at: Expr) -> tuple[Expr, Expr]:
     elastic = loader.basic_gradient * at + loader.cubic * at * at * at
     if held(made):
         return stiffness, elastic
-    slope = curve_slope(made, at) if has_curve(made) else own("host/first")
+    slope = curve_slope(made, at) if made.control.schedule.curved else own("host/first")
     if schedule.break_deflection > 0.0:
         edge = own("host/break")
         beyond = greater(edge, 0.0) * greater(size(at), edge)

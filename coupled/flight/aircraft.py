@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from coupled.flight.airframe import JSBSimAirframe
+from coupled.flight.airframe import JSBSimAirframe, main_file
 from coupled.flight.altered import Alterations
 from coupled.flight.gusts import Gusts
 from coupled.flight.loading import Loading
@@ -37,6 +37,7 @@ def make_aircraft(
     Before each frame the conditions act in their order, then the gusts, then the factors, which
     follow a moved trim. A model of the user's own is first loaded in a process of its own.
     """
+    main_file(flight, models, file)  # refuses what is not there
     check_own_model(flight, frame_s, controls, models, file)
     return make_unchecked(
         *(flight, frame_s, controls, models, file),

@@ -49,7 +49,7 @@ from coupled.flight.modelfile import catalogue, loadable, models_in, properties_
 from coupled.flight.modelparts import NothingToScaleError
 from coupled.flight.modeltext import UnreadableModelError
 from coupled.flight.newton import Elevators, newton_trim, why_unbalanced
-from coupled.flight.putback import put_back
+from coupled.flight.putback import put_back, stall_limits
 from coupled.flight.surfacemap import flown_through, stops_found
 from coupled.flight.wrapper import Step, Wrapper, led_by
 from coupled.record.channels import ALTITUDE, LONGITUDINAL, SURFACES, motion_channels
@@ -74,6 +74,9 @@ _MOVED_TO = {
 }
 _WIND = tuple(f"atmosphere/wind-{way}-fps" for way in ("north", "east", "down"))
 _HEIGHT, _WHEELS = "position/h-agl-ft", "gear/wow"
+_MOVED_BY_TRIM = re.compile(
+    r"fcs/(throttle|elevator|aileron|rudder|.*trim)-cmd-norm(\[\d+\])?"
+).fullmatch
 _STRUCTURE = re.compile(r"contact/unit(\[\d+\])?/WOW").fullmatch  # contacts other than wheels
 
 
@@ -99,6 +102,10 @@ class _Log(jsbsim.FGLogger):
 
     def flush(self) -> None:
         """End a message."""
+
+
+def _nearly_equal(value: float, given: float) -> bool:
+    return math.isclose(value, given, rel_tol=1e-6, abs_tol=1e-12)
 
 
 Floats = NDArray[np.float64]
@@ -139,7 +146,8 @@ def _own_folder(flight: Flight, file: object) -> Path:
     except (OSError, ValueError):  # a name that no folder can have
         there = False
     if not there:
-        raise InputError(file, "flight.model_folder", f"holds no {flight.main_file}")
+        problem = f"{flight.folder!r} holds no {flight.main_file}"
+        raise InputError(file, "flight.model_folder", problem)
     return folder
 
 
@@ -258,7 +266,7 @@ class JSBSimAirframe:
         more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
         problem = (
             f"{self._flight.model} reads properties that JSBSim does not create, as FlightGear"
-            f" does: {listed(names[:LISTED])}{more}; give each a value here"
+            f" does: {listed(names[:LISTED])}{more}; give each a value in flight.properties"
         )
         return self.fault("properties", problem)
 
@@ -269,7 +277,7 @@ class JSBSimAirframe:
             raise self.fault(key, "is set from the rig's other keys; leave it out")
         node = self._node(name, f"flight.{key}", self._file)
         node.set_double_value(value)
-        if not math.isclose(node.get_double_value(), value, rel_tol=1e-6, abs_tol=1e-12):
+        if not _nearly_equal(node.get_double_value(), value):
             raise self.fault(key, f"{self._flight.model} does not let it be set to {value:g}")
 
     def _node(self, name: str, key: str = "model", file: object = None) -> Any:
@@ -355,6 +363,17 @@ class JSBSimAirframe:
             raise self.fault(UNTRIMMED, f"{where}: {problem}; choose others")
         if not started or not math.isfinite(fdm["aero/alpha-rad"]):
             raise self.fault("model", f"{flight.model} does not start: {_log.text.strip()[-200:]}")
+        self._check_kept()
+
+    def _check_kept(self) -> None:
+        """Refuse a property of the rig file that the model itself sets, as a flap's position."""
+        for name, value in self._flight.properties.items():
+            now = self._fdm[name]
+            if _MOVED_BY_TRIM(name) is None and not _nearly_equal(now, value):
+                problem = f"{self._flight.model} sets it itself, to {now:g} in trim; leave it out"
+                if self.has(command := name.replace("-pos-", "-cmd-")) and command != name:
+                    problem += f", or give {command}"
+                raise self.fault(f"properties.{name}", problem)
 
     def _connected(self, reads: Sequence[Read], writes: Sequence[Write]) -> PlainAircraft | None:
         """Return the aircraft by its nodes' addresses; None if they are not known."""
@@ -390,10 +409,21 @@ class JSBSimAirframe:
             return why
         return 'JSBSim\'s trim does not find the balance that there is; try trim = "newton"'
 
-    def restart(self) -> None:
-        """Reset and trim the aircraft; only one without acting wrappers (`kept`)."""
-        put_back(self._fdm)
-        self._trim(())
+    def restarter(self) -> Callable[[], None] | None:
+        """Return the function that resets and trims the aircraft; None if a reset loses its stall.
+
+        Only for one that has not been reset, and without acting wrappers (`kept`).
+        """
+        set_limits = stall_limits(self._fdm, self._main)
+        if set_limits is None:
+            return None
+
+        def restart() -> None:
+            put_back(self._fdm)
+            set_limits()
+            self._trim(())
+
+        return restart
 
     def put(self, state: Mapping[str, float]) -> None:
         """Put the aircraft into a state of motion, by channel, SI; other channels stay.

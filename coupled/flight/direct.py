@@ -66,23 +66,24 @@ def _travel(
         answers = min(begins + frames, flown) - 1
         rate = moved[answers][turn] - still[answers][turn]
         first, last = positions[0], positions[answers]
-        fault = ""
-        if not flight.direct_controls:
+        fault, within, remedies = "", f"within {_LATEST_s:g} s", []
+        if flight.direct_controls:
+            within = "at once"
+            remedies = ["if a control law or a lag moves it, give direct_controls = false"]
+        else:
             first = last
         if not math.isfinite(first) or abs(first) < _MOVED_rad:
-            within = "at once" if flight.direct_controls else f"within {_LATEST_s:g} s"
             fault = f"does not move its {surface} {within}"
+            keys = f"controls.{control}.surface_property and command_property"
+            remedies.append(f"if its properties have other names, {keys}")
         elif abs(last - first) > 0.25 * abs(first):
-            fault = f"moves its {surface} by more than the command (a control law or a lag)"
+            fault = f"moves its {surface} by more than the command"
         elif rate <= 0.0:
-            fault = f"turns the wrong way on a positive {control}"
+            fault, remedies = f"turns the wrong way on a positive {control}", []
         if fault:
-            raise InputError(
-                file,
-                "flight.model",
-                f"{flight.model} has no direct controls: it {fault};"
-                " c172p, T37, 737, B747 and awjsra fly with theirs",
-            )
+            name = flight.model + " has no direct controls: it" * flight.direct_controls
+            problem = "; ".join([f"{name} {fault}", *remedies])
+            raise InputError(file, "flight.model", problem)
         travel[control] = first / step
     return travel
 

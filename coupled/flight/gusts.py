@@ -12,7 +12,8 @@ left positive.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -26,6 +27,23 @@ _GUST_NORTH, _GUST_EAST = "atmosphere/gust-north-fps", "atmosphere/gust-east-fps
 _HEADING = "attitude/psi-rad"
 _UP, _ACROSS = 97, 98  # random streams of a seed
 _BLOCK = 1024  # frames made at a time
+
+
+class GivenAir(NamedTuple):
+    """The motion of the air over each frame, m/s, in place of the rig's gusts; None where drawn.
+
+    `up` is its vertical speed, `across` that across the heading, from the left positive.
+    """
+
+    up: Sequence[float] | None = None
+    across: Sequence[float] | None = None
+
+    def repeated(self, times: int) -> GivenAir:
+        """Return the air of frames that are divided into so many steps."""
+        return GivenAir(*(None if one is None else np.repeat(one, times).tolist() for one in self))
+
+
+DRAWN = GivenAir()
 
 
 def dryden(
@@ -66,30 +84,36 @@ def dryden_filter(
 
 
 class Gusts(Wrapper):
-    """Gusts drawn from a seed, if the rig has them; the upward speed may be given by frame."""
+    """Gusts drawn from a seed, if the rig has them, or given by frame."""
 
     def __init__(
         self,
         flight: Flight,
         frame_s: float,
         seed: int = 0,
-        air_m_per_s: Iterable[float] | None = None,
+        air: GivenAir = DRAWN,
     ) -> None:
         self._flight, self._frame_s, self._seed = flight, frame_s, seed
-        self._air = air_m_per_s
+        self._air = air
 
     def attach(self, aircraft: Aircraft) -> Hook | None:
         """Return a hook that sets the gust of each frame: as given, or from the spectrum."""
         flight, given = self._flight, self._air
-        up = self._drawn(aircraft, flight.gust_rms, _UP) if given is None else iter(given)
-        across = self._drawn(aircraft, flight.lateral_gust_rms, _ACROSS)
+        up = self._speeds(aircraft, given.up, flight.gust_rms, _UP)
+        across = self._speeds(aircraft, given.across, flight.lateral_gust_rms, _ACROSS)
         hooks = [] if up is None else [_rising(aircraft, up)]
         hooks += [] if across is None else [_crossing(aircraft, across)]
         return together(hooks)
 
-    def _drawn(self, aircraft: Aircraft, rms_m_per_s: float, stream: int) -> Iterator[float] | None:
-        if rms_m_per_s == 0.0:
-            return None
+    def _speeds(
+        self,
+        aircraft: Aircraft,
+        given: Sequence[float] | None,
+        rms_m_per_s: float,
+        stream: int,
+    ) -> Iterator[float] | None:
+        if given is not None or rms_m_per_s == 0.0:
+            return None if given is None else iter(given)
         lengths = self._flight.gust_length, aircraft.motion()[SPEED]
         return dryden(rms_m_per_s, *lengths, self._frame_s, self._seed, stream)
 

@@ -1,10 +1,9 @@
 """An aircraft kept between the flights of a sweep, reset and trimmed for each.
 
 To load a T-37 takes an eighth of a flight of 20 s. JSBSim's reset avoids this, but does not restore
-all state. After it, a c172p's stall has no hysteresis: the reset sets the two angles of attack that
-limit it to zero, and no property sets them. The moving aerodynamic reference point is not restored
-either. An awjsra's nozzles start from their last position, as each kinematic component does; with
-their position and the wind set back, the next trim still differs by 1e-14.
+all state (`putback`). The moving aerodynamic reference point is not restored, and an awjsra's
+nozzles start from their last position, as each kinematic component does; with their position and
+the wind set back, the next trim still differs by 1e-14.
 
 So an aircraft is kept only for models for which a test has found each record to be the same to the
 byte after any earlier flight (`tests/flight/test_kept`), and only for flights that change nothing
@@ -28,7 +27,7 @@ from coupled.flight.putback import tells
 from coupled.rig.parameters import Flight
 
 # Models of JSBSim's package that its reset restores exactly.
-PUT_BACK_EXACTLY = frozenset({"737", "B747", "T37", "f16"})
+PUT_BACK_EXACTLY = frozenset({"737", "B747", "T37", "c172p", "f16"})
 # Keys of a flight section that only set its trim, or change no aircraft.
 _HARMLESS = frozenset(
     {"model", "altitude", "calibrated_airspeed", "flight_path", "direct_controls", "motion_stamp"}
@@ -40,13 +39,15 @@ _HARMLESS = frozenset(
 class CachedAircraft:
     """An aircraft for one flight; `kind` is None if it is not kept afterwards.
 
-    `reads` are all its properties, `trimmed` their values in its first trim.
+    `reads` are all its properties, `trimmed` their values in its first trim, to which `restart`
+    returns it.
     """
 
     airframe: Airframe
     kind: Hashable = None
     reads: tuple[Read, ...] = ()
     trimmed: bytes = b""
+    restart: Callable[[], None] | None = None
 
     def state(self) -> bytes:
         """Return the current values of the properties, concatenated."""
@@ -54,18 +55,22 @@ class CachedAircraft:
 
     def restarted(self) -> bool:
         """Reset and trim the aircraft; return whether its state equals that of its first trim."""
-        assert isinstance(self.airframe, JSBSimAirframe)
+        assert self.restart is not None
         try:
-            self.airframe.restart()
+            self.restart()
         except InputError:
             return False
         return self.state() == self.trimmed
 
 
 def in_trim(airframe: JSBSimAirframe, kind: Hashable) -> CachedAircraft:
-    """Return an aircraft in its first trim, with its state."""
+    """Return an aircraft in its first trim, with its state if a reset may restore it."""
+    restart = airframe.restarter()
+    if restart is None:
+        return CachedAircraft(airframe)
     found = (airframe.reader(name) for name in airframe.names() if tells(name))
-    cached = CachedAircraft(airframe, kind, tuple(read for read in found if read is not None))
+    reads = tuple(read for read in found if read is not None)
+    cached = CachedAircraft(airframe, kind, reads, restart=restart)
     return replace(cached, trimmed=cached.state())
 
 

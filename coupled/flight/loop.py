@@ -7,7 +7,6 @@ finite state or is interrupted keeps its record so far.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
@@ -19,7 +18,7 @@ from coupled.flight.companion import Companion
 from coupled.flight.conditions import condition_wrappers
 from coupled.flight.direct import check_direct_controls
 from coupled.flight.frames import Progress
-from coupled.flight.gusts import Gusts
+from coupled.flight.gusts import DRAWN, GivenAir, Gusts
 from coupled.flight.kept import AircraftCache, CachedAircraft
 from coupled.flight.manoeuvre import Manoeuvre
 from coupled.flight.started import StartedFlight
@@ -33,7 +32,7 @@ from coupled.timing import timed
 def fly(
     manoeuvre: Manoeuvre,
     progress: Progress | None = None,
-    air_m_per_s: Sequence[float] | None = None,
+    air: GivenAir = DRAWN,
     companion: Companion | None = None,
     cache: AircraftCache | None = None,
     stops: bool = False,
@@ -41,14 +40,14 @@ def fly(
     """Fly a manoeuvre and return its record, SI, one row a frame.
 
     `progress` is called repeatedly with frames done and frames in all. The manifest has the inputs,
-    and under `ended_early` why and when a flight ended early. `air_m_per_s` is the upward speed of
-    the air at each frame, in place of the rig's gusts. A `companion` is called before and after
+    and under `ended_early` why and when a flight ended early. `air` is the motion of the air, in
+    place of the rig's gusts. A `companion` is called before and after
     each frame. A `cache` keeps the aircraft for the next flight, unless its air is given. With
     `stops` the manifest has the stops of the compared control's surface, for an aircraft with
     direct controls.
     """
-    cache = cache if air_m_per_s is None else None
-    make = partial(make_airframe, manoeuvre, air_m_per_s)
+    cache = cache if air == DRAWN else None
+    make = partial(make_airframe, manoeuvre, air)
     with timed("trim"):
         cached = CachedAircraft(make()) if cache is None else cache.take(manoeuvre, make)
     flight = StartedFlight(manoeuvre, cached.airframe, manoeuvre.frames, companion)
@@ -69,7 +68,7 @@ def _surface_stops(manoeuvre: Manoeuvre, airframe: Airframe) -> dict[str, Any]:
     return {"surface_stops": {SURFACES[control]: airframe.surface_stops(control)}}
 
 
-def make_airframe(manoeuvre: Manoeuvre, air_m_per_s: Sequence[float] | None = None) -> Airframe:
+def make_airframe(manoeuvre: Manoeuvre, air: GivenAir = DRAWN) -> Airframe:
     """Return the manoeuvre's aircraft, trimmed and checked, or its bench."""
     rig, source = manoeuvre.rig, manoeuvre.source
     if rig.flight is None:
@@ -92,7 +91,7 @@ def make_airframe(manoeuvre: Manoeuvre, air_m_per_s: Sequence[float] | None = No
             conditions=condition_wrappers(
                 manoeuvre.conditions, manoeuvre.file, frame_s, manoeuvre.seed
             ),
-            gusts=Gusts(rig.flight, frame_s, manoeuvre.seed, air_m_per_s),
+            gusts=Gusts(rig.flight, frame_s, manoeuvre.seed, air),
         )
     except InputError as fault:
         make = partial(make_aircraft, frame_s=frame_s, models=models, file=rig_file)

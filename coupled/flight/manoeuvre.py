@@ -25,7 +25,7 @@ from coupled.rig.parameters import Control, PlainName
 from coupled.rig.rig import Rig
 from coupled.rig.serving import check_service, has_services, service_channels
 from coupled.rig.structure import Structure
-from coupled.schema import Given, Section, build, quantity
+from coupled.schema import Given, Section, build, plain_value, quantity
 
 Configuration = Literal[
     "rigid", "uncompensated", "deflection only", "gradient only", "compensated", "calibrated low"
@@ -148,6 +148,7 @@ class Manoeuvre:
         if not self.label:
             object.__setattr__(self, "label", self.name)
         object.__setattr__(self, "pilots", {n: as_pilot(p) for n, p in self.pilots.items()})
+        object.__setattr__(self, "seed", plain_value(self.seed))
         scalars = {"name": self.name, "duration_s": self.duration_s, "seed": self.seed}
         build(Flown, scalars, self.file, "")
         self._check_kind()
@@ -203,6 +204,9 @@ class Manoeuvre:
     def _check_kind(self) -> None:
         """Refuse keys of a bench for a rig with an aircraft, and the reverse."""
         rig, file, bench = self._rig_name, self.file, self.bench
+        twice = [x for i, x in enumerate(self.record_properties) if x in self.record_properties[:i]]
+        if twice:
+            raise InputError(file, "record_properties", f"names {twice[0]} twice")
         if self.rig.flight is not None:
             if bench is not None:
                 raise InputError(file, "bench", f"{rig} has an aircraft, which gives q̄ itself")

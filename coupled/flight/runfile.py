@@ -60,6 +60,8 @@ def read_run(name: str) -> list[Manoeuvre]:
 
 def manoeuvres_from_table(table: dict[str, Any], file: Path) -> list[Manoeuvre]:
     """Return the cases of a run from its file's tables; `file` is named in faults."""
+    if "rig" not in table and ("controls" in table or "flight" in table):
+        raise InputError(file, "", "is a rig file; give a run (coupled new run writes one)")
     pilots = table.pop("pilot", None)
     keys = {**file_keys(RunFile, "m"), "pilot": "pilot"}
     run = _checked_run(table, keys, pilots, file)

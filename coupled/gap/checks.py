@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.errors import InputError
+from coupled.errors import InputError, nearest
 from coupled.flight.aircraft import make_aircraft
 from coupled.flight.altered import STILL
 from coupled.gap.thresholds import (
@@ -30,12 +30,13 @@ from coupled.gap.thresholds import (
     OTHER_ALTITUDE_m,
     SHORTEST_RECORD_s,
 )
-from coupled.record.channels import ControlName, channel, motion_channels, unit_of
+from coupled.record.channels import ControlName, channel, motion_channels
 from coupled.record.importing import plausible
 from coupled.record.record import Record
 from coupled.resources import aircraft_folder
 from coupled.rig.equations import specified_gradient
 from coupled.rig.parameters import Flight
+from coupled.rig.replay import replay_schedule
 from coupled.rig.rig import Rig
 from coupled.rig.rigfile import rig_from_table
 from coupled.schema import changed, file_keys
@@ -53,10 +54,11 @@ def check_record(
     """
     if rig.controls and control not in rig.controls:
         raise InputError(file, control, f"the rig has no {control}")
-    if rig.controls and rig.controls[control].schedule.deflection is not None:
-        key = f"controls.{control}.schedule.force_N"
-        problem = "is a curve, which a diagnosis does not model; give total_gradient_N_per_"
-        raise InputError(rig.name, key, f"{problem}{unit_of(control)}")
+    for data in rig.controls.values():
+        regressor = data.loader.regressor
+        if regressor is not None and regressor not in record:
+            problem = f"has no channel {regressor}, the regressor of the rig file"
+            raise InputError(file, "", f"{problem}; {nearest(regressor, record.channels)}")
     time = record.time_s
     steps = np.diff(time)
     rate = 1.0 / float(np.median(steps))
@@ -110,12 +112,12 @@ def _check_channels(rig: Rig, record: Record, control: ControlName, file: object
     stuck = both and plausible.is_constant(record[pressure])
     if stuck and not plausible.is_constant(record[gradient]):
         raise InputError(file, pressure, f"never changes, while {gradient} does: it is stuck")
-    data = rig.controls[control]
     for name in present[1:] if names[0] in present else present:
         most = float(np.max(np.abs(record[name])))
-        if most > plausible.FAR_BEYOND * data.travel:
+        travel = rig.controls[control].travel
+        if most > plausible.FAR_BEYOND * travel:
             raise InputError(
-                file, name, f"reaches {most:.3g}, beyond {data.travel:g}: is it in another unit?"
+                file, name, f"reaches {most:.3g}, beyond {travel:g}: is it in another unit?"
             )
     _check_signs(rig, record, control, file)
     _check_force_unit(rig, record, control, file)
@@ -171,8 +173,12 @@ def _check_schedule(rig: Rig, record: Record, control: ControlName, file: object
     gradient, pressure = channel(control, "gradient"), "dynamic_pressure_Pa"
     if gradient not in record or pressure not in record:
         return
-    specified = specified_gradient(rig.controls[control].schedule, record[pressure])
-    if not specified.any():
+    schedule, computed = rig.controls[control].schedule, channel(control, "computed")
+    specified = specified_gradient(schedule, record[pressure])
+    if schedule.curved and computed in record:
+        at = record[computed]
+        specified = replay_schedule(rig, control, record[pressure], computed=at)
+    if np.median(specified) == 0.0:
         return
     ratio = float(np.median(record[gradient]) / np.median(specified))
     if not 1.0 / DOUBLED < ratio < DOUBLED:

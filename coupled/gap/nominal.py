@@ -5,6 +5,9 @@ fitted like effects (`fit`), with the stages driven by the measured inputs. Thei
 from the scatter of the score between stretches, or from the scatter of the values between records
 if that is larger. Parameters with nearly proportional signatures are not identifiable: for example
 friction and damping, if all motion has one speed.
+
+A parameter that the records do not determine to its own size stays as filed. If it is filed as 0
+the machine is taken not to have the component, and the upper limit of its size is stated.
 """
 
 from __future__ import annotations
@@ -19,20 +22,33 @@ from numpy.typing import NDArray
 
 from coupled.errors import InputError, nearest
 from coupled.gap.checks import check_record
-from coupled.gap.effects.effect import Effect, Parameter, Signature, touched
-from coupled.gap.effects.library import EFFECTS
+from coupled.gap.effects.effect import (
+    BY_REGRESSOR,
+    Effect,
+    Parameter,
+    Signature,
+    keys_of,
+    touched,
+)
+from coupled.gap.effects.library import BY_NAME, EFFECTS, LAG, SETTINGS, STAMP
 from coupled.gap.effects.linkage import SERVO
-from coupled.gap.effects.scales import Scales
+from coupled.gap.effects.scales import Scales, in_scale
 from coupled.gap.prepare import readers_of
-from coupled.gap.search.case import Tell
-from coupled.gap.search.fit import fit_alone
+from coupled.gap.search.case import Case, Tell
+from coupled.gap.search.fit import fit_set
 from coupled.gap.search.found import Alike, Fit, alike
 from coupled.gap.signals.drives import as_driven
-from coupled.gap.signals.output import Output
+from coupled.gap.signals.output import Output, Part
 from coupled.gap.stages.airframe import airframe_outputs
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.tried import as_judged
-from coupled.gap.thresholds import FAR, LEAST_SERVO_RATIO, NEGLIGIBLE, SMALL, SERVO_START_Hz
+from coupled.gap.thresholds import (
+    FAR,
+    LEAST_SERVO_RATIO,
+    NEGLIGIBLE,
+    NORMAL_95,
+    SERVO_START_Hz,
+)
 from coupled.record.channels import ControlName, unit_of
 from coupled.record.record import Record
 from coupled.results import TableResult, frame_of
@@ -54,7 +70,10 @@ STAGE_OF_SECTION = {
 OF_LINKAGE = ("servo", "bend", "play", "arc", "structur", "contact")
 # The default parameters of a fit, by the stage that the records can judge.
 USUAL = {
-    "loader": ("mass", "damping", "basic_gradient", "friction", "offset", "delay"),
+    "loader": (
+        *("mass", "damping", "basic_gradient", "friction", "offset", "delay"),
+        *("regressor_force", "regressor_friction"),
+    ),
     "linkage": ("servo_frequency", "servo_damping_ratio", "bend", "play"),
 }
 # Parameters whose value 0 means that the component is absent: a fit stays above 0.
@@ -64,21 +83,29 @@ NONE_AT_ZERO = (
 )
 
 
-def default_keys(rig: Rig, control: ControlName, stages: set[str]) -> tuple[str, ...]:
+def default_keys(
+    rig: Rig, control: ControlName, stages: set[str], moved: bool = False
+) -> tuple[str, ...]:
     """Return the keys that are fitted by default, of the stages that the records can judge.
 
-    A basic gradient of 0 is no spring, a servo frequency of 0 no servo; they are not fitted.
+    A basic gradient of 0 is no spring, a servo frequency of 0 no servo; they are not fitted, nor is
+    a regressor that the file does not name. With imposed motion (`moved`) of the linkage only the
+    play shows.
     """
     fields = {f: key for key, f in _fields(rig, control, "loader").items()}
     loader, drive = rig.controls[control].loader, rig.controls[control].drive
     absent: set[str] = {"basic_gradient"} if loader.basic_gradient == 0.0 else set()
     if loader.servo_frequency == 0.0:
         absent |= {"servo_frequency", "servo_damping_ratio"}
+    if loader.regressor is None:
+        absent |= {"regressor_force", "regressor_friction"}
     found = []
     for stage, names in USUAL.items():
         wanted = names if stage in stages else ()
         if stage == "linkage" and drive == "setpoint":
             wanted = (*wanted, "servo_delay")  # of a bus, or of the servo's own cycle
+        if stage == "linkage" and moved:
+            wanted = ("play",)
         found += [f"loader.{fields[name]}" for name in wanted if name not in absent]
     return tuple(found)
 
@@ -138,7 +165,9 @@ def _bounds(holder: Section, field: str, start: float) -> tuple[float, float]:
 class Number:
     """A fitted parameter: value in the file, fitted value, and half of its 95 % interval.
 
-    `half` is None if the parameter is undetermined. `least` is the lower bound.
+    `half` is None if the parameter is undetermined, or absent: its filed value is 0, and its 95 %
+    interval includes 0. `most` is then the largest size in this interval. `least` is the lower
+    bound.
     """
 
     key: str
@@ -147,6 +176,7 @@ class Number:
     half: float | None
     least: float = -math.inf
     at_bound: bool = False
+    most: float | None = None
 
     @property
     def interval(self) -> tuple[float, float] | None:
@@ -155,10 +185,36 @@ class Number:
             return None
         return max(self.found - self.half, self.least), self.found + self.half
 
+    @property
+    def width(self) -> float:
+        """Half of the interval over the parameter's size, above 1 if it is not determined.
+
+        The size is the filed or the fitted value, whichever is larger.
+        """
+        if self.half is None:
+            return math.inf
+        return self.half / max(abs(self.filed), abs(self.found), 1e-300)
+
+    @property
+    def as_filed(self) -> Number:
+        """The parameter with its filed value, since the records do not determine it."""
+        most = None
+        if self.filed == 0.0 and self.half is not None:
+            most = abs(self.found) + self.half
+        return replace(self, found=self.filed, half=None, at_bound=False, most=most)
+
+    @property
+    def words(self) -> str:
+        """Why it stays as filed."""
+        if self.most is None:
+            return f"not determined by these records: {self.key}; it stays as filed"
+        return f"not shown by these records: {self.key}; it stays 0, and is at most {self.most:.3g}"
+
     def as_dict(self) -> dict[str, Any]:
         """Return the JSON."""
         ends = self.interval or (None, None)
         known = {"filed": self.filed, "found": self.found, "low": ends[0], "high": ends[1]}
+        known |= {} if self.most is None else {"most": self.most}
         return known | ({"at_bound": True} if self.at_bound else {})
 
 
@@ -212,7 +268,7 @@ class NominalFit(TableResult):
 
     @property
     def unknown(self) -> tuple[str, ...]:
-        """The keys of undetermined parameters."""
+        """The keys of parameters that stay as filed."""
         return tuple(number.key for number in self.numbers if number.half is None)
 
     def as_dict(self) -> dict[str, Any]:
@@ -250,12 +306,16 @@ def fit_nominal(
         problem = "holds too little to judge any stage by, so nothing can be fitted"
         raise InputError(next(iter(records)), "", problem)
     judged = {output.stage for output in outputs}
-    if any(output.in_series for output in outputs):
+    moved = readers[0].moved
+    if moved or any(output.in_series for output in outputs):
         judged.add("linkage")
-    chosen = tuple(keys) or default_keys(rig, control, judged)
-    effects = []
+    chosen = tuple(keys) or default_keys(rig, control, judged, moved)
+    scales = Scales.of(readers) if control in rig.controls else None
+    effects: list[Effect] = []
     for key in chosen:
         asked = freed(rig, control, key)
+        if key in BY_REGRESSOR and not asked.free[0].nominal(rig, control):
+            (asked,) = in_scale([asked], scales, rig, control)
         shown = as_judged([asked], readers, outputs)
         effects += [_with_starts(effect, outputs, rig, control) for effect in shown]
         if not touched(outputs, shown):
@@ -266,16 +326,17 @@ def fit_nominal(
     shown_in = {output.stage for output in touched(outputs, effects)}
     fits = _fitted(rig, control, outputs, effects, tell)
     numbers = dict(zip(chosen, fits.numbers(rig, control), strict=True))
-    scales = Scales.of(readers)
     groups = fits.whole.groups
-    while (worst := _least_determined(numbers, rig, control, effects, scales)) is not None:
-        # It keeps its value in the file, and the others are fitted again.
-        one = numbers[worst]
-        numbers[worst] = replace(one, found=one.filed, half=None, at_bound=False)
-        effects = [effect for effect in effects if effect.name != worst]
+    while loose := [numbers[e.name] for e in effects if numbers[e.name].width > 1.0]:
+        # The least determined one stays as filed, and the others are fitted again.
+        worst = max(loose, key=lambda number: number.width)
+        numbers[worst.key] = worst.as_filed
+        effects = [effect for effect in effects if effect.name != worst.key]
         fits = _fitted(rig, control, outputs, effects, tell)
         numbers |= {one.key: one for one in fits.numbers(rig, control)}
     held = fits.held
+    clock = {SETTINGS[STAMP].value_key(p) for p in SETTINGS[STAMP].free}
+    together = [one for group in groups.values() for one in alike(group)]
     found = tuple(numbers.values())
     used = [output for output in outputs if output.stage in shown_in]
     files = list(records)
@@ -286,7 +347,7 @@ def fit_nominal(
         control,
         known,
         found,
-        tuple(one for group in groups.values() for one in alike(group)),
+        tuple(one for one in together if clock.isdisjoint(one.keys)),
         tuple(_channel(output, rig, held.rig, files[output.record]) for output in used),
         doubts,
     )
@@ -316,35 +377,33 @@ def _fitted(
     """Return the fits to every other stretch, to all, and to each record alone."""
     records = len({output.record for output in outputs})
     _tell(tell, "fitting", 0, records + 2)
-    held = fit_alone(rig, control, outputs, effects, part="fitted")
+    held = _fit(rig, control, outputs, effects, part="fitted")
     _tell(tell, "fitting to all", 1, records + 2)
-    whole = fit_alone(rig, control, outputs, effects, held.values)
+    whole = _fit(rig, control, outputs, effects, held.values)
     return _Fits(effects, held, whole, _fits_by_record(rig, control, outputs, effects, whole, tell))
 
 
-def _least_determined(
-    numbers: Mapping[str, Number],
+def _fit(
     rig: Rig,
     control: ControlName,
+    outputs: Sequence[Output],
     effects: Sequence[Effect],
-    scales: Scales | None,
-) -> str | None:
-    """Return the key of the least determined parameter; None if all are determined.
+    start: Mapping[str, float] | None = None,
+    part: Part = "all",
+) -> Fit:
+    """Return effects fitted to a part of some outputs, beside a time stamp error of the force.
 
-    A parameter is not determined if half of its interval exceeds its filed and its fitted value. If
-    the filed value is 0, half of the interval must also exceed `FLOOR_SHARE` of its scale in these
-    records.
+    The error is a nuisance parameter within the tolerance of a recorder's clocks. Without it a lag
+    of a fraction of a frame is fitted as friction. A free delay of the force stands for it.
     """
-    loose = {}
-    for effect in effects:
-        one = numbers[effect.name]
-        scale = scales.size(effect.free[0].unit(rig, control)) if scales is not None else None
-        plain = SMALL * scale if scale is not None and one.filed == 0.0 else 0.0
-        least = max(abs(one.filed), abs(one.found), plain)
-        width = math.inf if one.half is None else one.half / max(least, 1e-300)
-        if width > 1.0:
-            loose[effect.name] = width
-    return max(loose, key=loose.__getitem__) if loose else None
+    clock = SETTINGS[STAMP]
+    (number,) = clock.free
+    timed = {number.key, BY_NAME[LAG].free[0].key}
+    loader = any({*clock.shows_in} & {*effect.shows_in} for effect in effects)
+    beside = [clock] if loader and timed.isdisjoint(keys_of(effects)) else []
+    priors = {clock.value_key(number): (0.0, number.high / NORMAL_95)}
+    case = Case(rig, control, outputs)
+    return fit_set(case, effects, beside, priors, start or {}, part=part)
 
 
 def _doubts_of_servo(
@@ -430,7 +489,7 @@ def _fits_by_record(
     for i, record in enumerate(records if len(records) > 1 else []):
         _tell(tell, f"fitting to record {i + 1} alone", i + 2, len(records) + 2)
         ours = [output for output in outputs if output.record == record]
-        found.append(fit_alone(rig, control, ours, effects, whole.values))
+        found.append(_fit(rig, control, ours, effects, whole.values))
     return found
 
 

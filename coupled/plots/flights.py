@@ -49,6 +49,7 @@ _PALER = 0.45  # of a later case's curves, overlaid
 _LONGEST_END = 30  # letters of a flight's end
 _USUAL = Layout()
 _FELT = 0.01  # of the force: a step below that is felt by no hand
+_POINTS = 400  # of a specified force, whose corners are at any deflection
 _SHORT = ("rigid", "uncomp.", "defl. only", "grad. only", "comp.", "cal. low")
 
 
@@ -306,7 +307,7 @@ def _draw_force(axes: Any, case: Sequence[Flight], system: System) -> None:
     record = case[0].record
     deflection = true_deflection(case[0].manoeuvre.rig, control, record)
     peak = int(np.argmax(np.abs(deflection)))
-    line = np.linspace(0.0, deflection[peak], 50)
+    line = deflection[peak] * np.append([0.0, 1e-9], np.linspace(0.0, 1.0, _POINTS)[1:])
     pressure = float(record["dynamic_pressure_Pa"][peak])
     wanted = specified_force(case[0].manoeuvre.rig, control, pressure, line)
     style = {"color": "0.65", "linewidth": 4.5, "zorder": 0, "label": "asked, specified"}

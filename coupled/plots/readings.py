@@ -53,8 +53,10 @@ def draw_readings(found: CalibrationResult, source: str, system: System = "si") 
             name += f" ({gradient * INCH_m / POUND_N:.3g} lb/in)"
         style: dict[str, Any] = {"color": color, "marker": mark, "linestyle": "none"}
         top.plot(factor * d, readings.v1[ours], label=name, **style)
-        reach = np.array([min(0.0, np.min(d)), max(0.0, np.max(d))])  # of a push and of a pull
-        top.plot(factor * reach, (a + b * gradient) * reach, color=color, linewidth=0.9)
+        # Beyond a breakout F is no multiple of δ: the fit is drawn from reading to reading.
+        at, fit = np.append(d, 0.0), np.append(a * d + b * f, 0.0)
+        order = np.argsort(at)
+        top.plot(factor * at[order], fit[order], color=color, linewidth=0.9)
         below.plot(factor * d, line.residual[ours], **style)
     below.axhline(0.0, color="black", linewidth=0.8)
     top.set_ylabel(f"v₁, {readings.signal}")

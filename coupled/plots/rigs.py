@@ -25,7 +25,10 @@ _POINTS = 200
 def draw_rig(rig: Rig) -> Figure:
     """Draw each control's G_T over q̄, and the share that its bend takes without a correction."""
     rig.check_controlled(rig.file)
-    rows, curves = len(rig.controls), [name for name in rig.controls if _curved(rig, name)]
+    rows, curves = (
+        len(rig.controls),
+        [name for name in rig.controls if rig.controls[name].schedule.curved],
+    )
     figure = Figure(figsize=(8.2, 0.7 + 2.2 * rows), layout="constrained")
     grid = figure.subplots(rows, 2, squeeze=False, sharex=not curves)
     highest = max(max(control.schedule.dynamic_pressure) for control in rig.controls.values())
@@ -49,10 +52,6 @@ def draw_rig(rig: Rig) -> Figure:
         axes.set_xlim(0.0, highest / 1000.0)
     figure.suptitle(plain(f"{rig.name}: gradient, and what the bend takes", 60), fontsize=12)
     return figure
-
-
-def _curved(rig: Rig, name: ControlName) -> bool:
-    return rig.controls[name].schedule.deflection is not None
 
 
 def _draw_curve(left: Any, right: Any, rig: Rig, name: ControlName) -> None:

@@ -15,8 +15,8 @@ import numpy as np
 
 from coupled.display import System, in_system
 from coupled.gap.noise.smooth import rate_of, smoothed
-from coupled.gap.signals.air import vertical_air
 from coupled.gap.signals.output import Floats, Output
+from coupled.gap.stages.airframe import gusts_of
 from coupled.gap.stages.openloop import command_of
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_channel, surface_points
@@ -116,12 +116,14 @@ def _missing(scene: Scene, rig: Rig | None) -> Floats:
     """
     at = _computed(scene, rig)
     speed, loader = scene.rate(at), scene.loader
-    control, gradient, second = scene.reader.control, scene.reader.gradient(), scene.reader.second()
-    product = replay_product(scene.base, control, at, gradient, second)
+    product = replay_product(scene.base, scene.reader.control, at, scene.reader.feel())
     moved = loader.mass * scene.rate(speed) + loader.damping * speed
     held = loader.friction * np.sign(speed) + loader.breakout * np.sign(at) - loader.offset
     if loader.bob_weight:
         held = held + loader.bob_weight * (scene.smooth("load_factor") - 1.0)
+    if (away := scene.reader.regressor()) is not None:
+        held = held + loader.regressor_friction * away * np.sign(speed)
+        held = held - loader.regressor_force * away
     spring = loader.basic_gradient * at + loader.cubic * at**3 + loader.force_curve.at(at)
     left = scene.smooth("force") - moved - spring - product - held
     sticks = (loader.friction > 0.0) & (np.abs(speed) < STICKS * np.std(speed))
@@ -175,10 +177,17 @@ def _ratio(scene: Scene, rig: Rig | None) -> Floats:
 
 
 def _air(scene: Scene, rig: Rig | None) -> Floats:
-    found = vertical_air(scene.reader.record, 1.0 / scene.frame_rate)
-    if found is None:
+    model = gusts_of(scene.base, scene.reader.record)
+    if model is None or model.up is None:
         raise KeyError("altitude_m")
-    return found.speed
+    return model.up.speed
+
+
+def _crossing_air(scene: Scene, rig: Rig | None) -> Floats:
+    model = gusts_of(scene.base, scene.reader.record)
+    if model is None or model.across is None:
+        raise KeyError("sideslip_rad")
+    return model.across.speed
 
 
 @dataclass(frozen=True)
@@ -215,6 +224,13 @@ def _other_force(scene: Scene) -> Floats:
     raise KeyError("force on another control")
 
 
+def _regressor(scene: Scene) -> Floats:
+    """Return the regressor less its reference; KeyError where the rig file names none."""
+    if (away := scene.reader.regressor()) is None:
+        raise KeyError("regressor")
+    return away
+
+
 def _about_trim(scene: Scene, surface: str) -> Floats:
     """Return a surface's position from where the record begins, °."""
     position = scene.smooth(surface)
@@ -244,6 +260,7 @@ SIGNALS: dict[str, Signal] = {
     "force": Signal("pilot's force F", "N", lambda s, r: s.smooth("force")),
     "other_force": Signal("force on the other control", "N", lambda s, r: _other_force(s)),
     "load": Signal("load factor beyond 1", "g", lambda s, r: s.smooth("load_factor") - 1.0),
+    "regressor": Signal("regressor less its reference", "its unit", lambda s, r: _regressor(s)),
     "pressure": Signal(
         "dynamic pressure q̄", "kPa", lambda s, r: 1e-3 * s.smooth("dynamic_pressure_Pa")
     ),
@@ -298,4 +315,5 @@ SIGNALS: dict[str, Signal] = {
     },
     "load_answer": Signal("load factor", "g", lambda s, r: s.seen("load_factor", r)),
     "air": Signal("rise of the air", "m/s", _air),
+    "crossing_air": Signal("air across the heading, from the left", "m/s", _crossing_air),
 }

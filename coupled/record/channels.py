@@ -7,11 +7,13 @@ has no motion except the dynamic pressure given to the host. Channels of sensors
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Sequence
 from functools import cache
 from typing import Literal
 
 from coupled.errors import InputError
+from coupled.units import parse_unit
 
 ControlName = Literal["column", "wheel", "pedals"]
 CONTROL_NAMES: tuple[ControlName, ...] = ("column", "wheel", "pedals")
@@ -130,6 +132,45 @@ def noisy_channels(controls: Sequence[str], flown: bool) -> list[str]:
     """Return the channels of sensors, for which noise may be given."""
     names = [control_channels(control)[i] for control in controls for i in _NOISY]
     return names + list(motion_channels(controls, flown))
+
+
+# Similarity by `difflib`, above which a name is a known one, mistyped: two letters exchanged in a
+# name of 13 letters give 0.92, and two channels of a record at most 0.86.
+_MISTYPED = 0.9
+
+
+def misnamed(names: Sequence[str]) -> tuple[str, str] | None:
+    """Return the first name that is a mistyped channel, or one in another unit, and its right name.
+
+    The right one is absent. Other names are a user's own channels, which a record may have.
+    """
+    known = record_channels(CONTROL_NAMES, flown=True)
+    absent = [name for name in known if name not in names]
+    stems = {_stem(name): name for name in absent}
+    plain = {name.casefold(): name for name in absent}
+    for name in names:
+        if name in (*known, VALIDITY, LOADER_TIME):
+            continue
+        alike = difflib.get_close_matches(name.casefold(), plain, n=1, cutoff=_MISTYPED)
+        meant = stems.get(_stem(name)) or (plain[alike[0]] if alike else None)
+        if meant is not None:
+            return name, meant
+    return None
+
+
+def _stem(name: str) -> str:
+    """Return a channel's name without its unit, in lower case."""
+    words = name.split("_")
+    for i in range(1, len(words)):
+        if parse_unit("_".join(words[i:]).replace("_per_", "/")) is not None:
+            return "_".join(words[:i]).casefold()
+    return name.casefold()
+
+
+def unit_at_end(name: str) -> str:
+    """Return the unit that ends a channel's name: K of `motor_temperature_K`, or its last word."""
+    head, per, last = name.rpartition("_per_")
+    return head.rpartition("_")[2] + per + last if per else name.rpartition("_")[2]
 
 
 def control_named(word: str, file: object) -> ControlName:

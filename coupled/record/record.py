@@ -19,7 +19,7 @@ from coupled.arguments import public
 from coupled.errors import InputError, MissingKeyError, nearest, shown, shown_value
 from coupled.files import MOST_TEXT_bytes, check_format, json_text, read_bytes, write_text
 from coupled.outputs import Outputs
-from coupled.record.channels import TIME
+from coupled.record.channels import TIME, misnamed
 from coupled.record.csvfile import read_columns, write_table
 from coupled.results import TableResult
 
@@ -208,6 +208,11 @@ def record_of(
     """Return the record of columns by name; `file` is named in faults. Raises InputError."""
     if TIME not in columns:
         raise InputError(file, TIME, f"is missing; a record has it ({nearest(TIME, columns)})")
+    wrong = misnamed(list(columns))
+    if wrong is not None:
+        name, meant = wrong
+        problem = f"is no channel of a record; rename it to {meant}, in its unit, or leave it out"
+        raise InputError(file, name, problem)
     if len(columns) < 2 or len(columns[TIME]) < 2:
         raise InputError(file, "", "holds no channel over time")
     if not np.all(np.diff(columns[TIME]) > 0.0):

@@ -54,9 +54,7 @@ def _numbers(name: str, control: Control) -> Iterator[tuple[str, str]]:
     yield "damping", f"{loader.damping:.4g} N·s/{d}"
     yield "breakout", f"{loader.breakout:.4g} N"
     yield "friction", f"{loader.friction:.4g} N"
-    what = (
-        "gradient G_T" if control.schedule.deflection is None else "steepest gradient of the curve"
-    )
+    what = "steepest gradient of the curve" if control.schedule.curved else "gradient G_T"
     yield what, f"{min(gradients):.4g} to {max(gradients):.4g} N/{d}"
     yield "bend K", f"{loader.bend:.4g} {d}/N"
     yield "  lost at most, uncorrected", percent(uncompensated_loss(loader.bend, max(gradients)))

@@ -11,8 +11,9 @@ from __future__ import annotations
 import ctypes
 import hashlib
 import os
+import sqlite3
 from collections.abc import Callable
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, TypeVar, cast, get_type_hints
@@ -23,6 +24,7 @@ from llvmlite import binding, ir
 from numba import types
 from numba.core import config
 from numba.core.caching import FunctionCache
+from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher, cpu_target
 from numba.core.runtime import rtsys
 from numba.extending import intrinsic
@@ -33,6 +35,7 @@ from coupled.timing import timed
 
 # A smaller state of a decay is at rest; subnormal numbers would slow the processor.
 TINY = 1e-100
+_LONGEST_s = 600.0  # that a process waits for another one's compilation
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -76,12 +79,12 @@ def entry(function: F, nogil: bool = False) -> F:
     If no folder can be written (a read-only install without a writable home, and no
     NUMBA_CACHE_DIR set) it is compiled at its first call in every process instead.
     """
+    if config.DISABLE_JIT:
+        return function
     chosen = config.CACHE_DIR
     config.CACHE_DIR = _cache_folder(chosen, Path(function.__code__.co_filename).parent)
     try:
-        dispatcher = numba.njit(function, nogil=nogil)
-        dispatcher._cache = _kept(function)
-        return cast(F, dispatcher)
+        return cast(F, _compiled_once(numba.njit(function, nogil=nogil), _Kept(function)))
     except RuntimeError:  # numba's, if there is no place for a cache
         return cast(F, numba.njit(function, nogil=nogil))
     finally:
@@ -93,22 +96,56 @@ def long_entry(function: F) -> F:
     return entry(function, nogil=True)
 
 
-def _kept(function: Callable[..., Any]) -> Any:
-    """Return a cache that loads machine code without the data of a compilation.
+class _Kept:
+    """A cache that loads machine code without the data of a compilation, and compiles it once.
 
     numba first loads all that it knows of types and of linear algebra, which takes longer than the
-    rest of a start; machine code needs only the functions of its memory.
+    rest of a start; machine code needs only the functions of its memory. What is not on disk is
+    compiled by one process while others wait: at once they would also mistake each other's code.
     """
-    cache: Any = FunctionCache(function)
 
-    def load_overload(kinds: Any, context: Any) -> Any:
+    def __init__(self, function: Callable[..., Any]) -> None:
+        self._cache: Any = FunctionCache(function)
+        self.cache_path = Path(self._cache.cache_path)
+        self._lock_file = self.cache_path / f"{function.__name__}.lock"
+        self.alone = ExitStack()
+
+    def load_overload(self, kinds: Any, context: Any) -> Any:
+        """Return what is on disk; else None, with the lock of the entry taken."""
         rtsys.initialize(context)
-        with cache._guard_against_spurious_io_errors():
-            return cache._load_overload(kinds, context)
+        found = self._load(kinds, context)
+        if found is None and self._locked():  # by now another process may have compiled it
+            found = self._load(kinds, context)
+        return found
+
+    def save_overload(self, kinds: Any, compiled: Any) -> None:
+        self._cache.save_overload(kinds, compiled)
+
+    def _load(self, kinds: Any, context: Any) -> Any:
+        with self._cache._guard_against_spurious_io_errors():
+            return self._cache._load_overload(kinds, context)
         return None
 
-    cache.load_overload = load_overload
-    return cache
+    def _locked(self) -> bool:
+        # SQLite's lock works on every system, and the kernel releases it after a kill.
+        with suppress(sqlite3.Error):  # a file system without locks
+            lock = sqlite3.connect(self._lock_file, timeout=_LONGEST_s, isolation_level=None)
+            self.alone.callback(lock.close)
+            lock.execute("BEGIN EXCLUSIVE")
+            return True
+        return False
+
+
+def _compiled_once(dispatcher: Any, cache: _Kept) -> Any:
+    """Return an entry's dispatcher with its cache, whose lock is released after a compilation."""
+    compile_kinds, dispatcher._cache = dispatcher.compile, cache
+
+    def compile_alone(kinds: Any) -> Any:
+        with global_compiler_lock, cache.alone:
+            return compile_kinds(kinds)
+
+    dispatcher.compile = compile_alone
+    return dispatcher
 
 
 def bound(kernel: F, *arguments: Any) -> F:

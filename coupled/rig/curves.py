@@ -7,6 +7,7 @@ f(−x) = −f(x). A curve without nodes leaves the effect out. `piecewise` has 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cache
 from itertools import pairwise
 from typing import ClassVar
 
@@ -133,6 +134,15 @@ class DeflectionReading(Curve):
     reading: list[float] = quantity("{d}", [])
 
 
+class GripLoad(Curve):
+    """What the force on the grip adds to the reading of δ there; it may fall, as no bend does."""
+
+    LISTS = ("force", "reading")
+
+    force: list[float] = quantity("N", [])
+    reading: list[float] = quantity("{d}", [])
+
+
 class ForceReading(Curve):
     """The reading of F by the host over F, before the scale of `Sensing`."""
 
@@ -165,15 +175,26 @@ class CommandCurve(Curve):
 
 def curves_of(section: Section, d: str) -> Iterator[tuple[str, Curve]]:
     """Yield the curves of a section by their keys in a file, absent ones too."""
-    for key, field in file_keys(type(section), d).items():
-        value = getattr(section, field)
-        if isinstance(value, Curve):
-            yield key, value
+    for key, field in _curve_fields(type(section), d):
+        yield key, getattr(section, field)
+
+
+@cache
+def _curve_fields(section: type[Section], d: str) -> tuple[tuple[str, str], ...]:
+    """Return the keys in a file, and the fields, of a section's curves."""
+    kinds = {name: field.annotation for name, field in section.model_fields.items()}
+    return tuple(
+        (key, field)
+        for key, field in file_keys(section, d).items()
+        if isinstance(kind := kinds[field], type) and issubclass(kind, Curve)
+    )
 
 
 def check_curves(section: Section, file: object, path: str, d: str) -> None:
     """Raise InputError for a curve of a section whose lists are not those of a function."""
     for key, curve in curves_of(section, d):
+        if not curve.model_fields_set:  # absent
+            continue
         _check_lists(curve, file, f"{path}.{key}", d)
         if curve.nodes:
             _check_values(curve, file, f"{path}.{key}", d)

@@ -62,7 +62,7 @@ def specified_force(
     """
     data = rig.controls[cast(ControlName, control)]
     pressure = np.asarray(pressure_Pa, dtype=float)
-    if data.schedule.deflection is not None:
+    if data.schedule.curved:
         preload = np.sign(deflection) * data.loader.breakout
         return np.asarray(preload + curve_force(data.schedule, pressure, deflection))
     first = specified_gradient(data.schedule, pressure)

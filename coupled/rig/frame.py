@@ -43,6 +43,31 @@ _ROUNDS = 24  # iterations for grips at their reach: terms of half the bends lea
 
 
 @stage
+def set_feel(
+    p: ControlParameters,
+    s: ControlState,
+    first: float,
+    second: float,
+    left: float,
+    computed: float,
+) -> float:
+    """Set what the host makes of its schedule for the frame; return G_T at δc, N/d.
+
+    `first` and `second` are the gradients in N/d of a schedule without a curve, `left` the share
+    of the feel that has not failed, `computed` δc about neutral as the host read it, d. A curve is
+    that at the schedule's pressure.
+    """
+    m = s.modification
+    gradient = left * first
+    set_gradients(p.modification, m, gradient, left * second)
+    if p.schedule.nodes > 0:
+        set_curve(p.modification, m, p.schedule, s.schedule.pressure, left)
+        gradient = local_gradient(p.modification, m, computed)
+    set_inertia(p.inertia, s.inertia, p.loader, s.loader, gradient)
+    return gradient
+
+
+@stage
 def set_product(
     p: ControlParameters, m: ModificationState, computed: float, computed_read: float
 ) -> float:
@@ -103,16 +128,8 @@ def host_frame(
         read = read_pressure(p.schedule, s.schedule, pressure_read)
         host.first, host.second = gradients(p.schedule, read)
         host.computed = computed_read
-    first, second = host.first, host.second
-    if s.services.on:
-        first *= 1.0 - s.services.feel_lost
-        second *= 1.0 - s.services.feel_lost
-    set_gradients(p.modification, m, first, second)
-    if p.schedule.nodes > 0:
-        share = 1.0 - s.services.feel_lost if s.services.on else 1.0
-        set_curve(p.modification, m, p.schedule, s.schedule.pressure, share)
-        first = local_gradient(p.modification, m, host.computed - neutral)
-    set_inertia(p.inertia, s.inertia, p.loader, s.loader, first)
+    left = 1.0 - s.services.feel_lost if s.services.on else 1.0
+    gradient = set_feel(p, s, host.first, host.second, left, host.computed - neutral)
     product = set_product(p, m, computed - neutral, host.computed - neutral)
     if not missed:
         bent = estimate(p.compensation, computed_read, force_read)
@@ -127,9 +144,9 @@ def host_frame(
     out[1] = computed_read
     out[2] += p.sensing.deflection_zero
     at_grip = transducer(p.linkage, deflection(p.linkage, s.linkage, force))
-    out[2] += read_grip(p.sensing, at_grip)
+    out[2] += read_grip(p.sensing, at_grip, force)
     out[3] = estimated
-    out[4] = first
+    out[4] = gradient
     out[5] += product
     out[6] = product - ended
     out[7] = command

@@ -18,7 +18,8 @@ reversal inside a step costs the difference between two displacements of order h
 order.
 
 Friction may depend on the direction of motion and on the load (gears, worn guides): `pull` or
-`push`, and `by_load`·|F|, are added to the levels above. Rigid friction that depends on direction
+`push`, `by_load`·|F| and `by_regressor`·(r − r₀), r a channel of a record, are added to the levels
+above; their sum is not below zero. Rigid friction that depends on direction
 only is plain friction of the mean level and a constant force of half the difference.
 
 Curves add to it (`curves`): one by the load, and one by the rate, whose value at rest adds to
@@ -61,6 +62,8 @@ class FrictionParameters(Protocol):
     pull: float  # addition for motion aft, N
     push: float  # addition for motion forward, N
     by_load: float  # addition for each N of load
+    by_regressor: float  # addition for each unit of the regressor, N
+    regressed: float  # the current addition by the regressor, N (`loader.set_regressor`)
     elastic_share: float  # of the bristles' largest deflection, below which nothing slips
     dry: int  # whether there is any
     rigid: int  # and its contact is rigid
@@ -93,7 +96,8 @@ def _varies(given: Given) -> bool:
     loader = given.control.loader
     ahead, back = _at_rest(given)
     added = (loader.friction_pull + ahead, loader.friction_push + back)
-    return any((*added, loader.friction_by_load, loader.load_curve.nodes))
+    others = (loader.friction_by_load, loader.regressor_friction, loader.load_curve.nodes)
+    return any((*added, *others))
 
 
 def _at_rest(given: Given) -> tuple[float, float]:
@@ -118,6 +122,8 @@ FRICTION = Declaration(
         "pull": lambda g: g.control.loader.friction_pull + _at_rest(g)[0],
         "push": lambda g: g.control.loader.friction_push + _at_rest(g)[1],
         "by_load": lambda g: g.control.loader.friction_by_load,
+        "by_regressor": lambda g: g.control.loader.regressor_friction,
+        "regressed": lambda g: 0.0,
         "elastic_share": lambda g: g.control.loader.friction_elastic_share,
         "dry": _dry,
         "rigid": lambda g: _dry(g) and g.control.loader.friction_stiffness == 0.0,
@@ -154,7 +160,7 @@ def added_friction(p: FrictionParameters, load: float, direction: float) -> floa
     """Return the additions to friction by direction of motion and by load (N), N."""
     if p.varies == 0:
         return 0.0
-    added = (p.pull if direction > 0.0 else p.push) + p.by_load * load
+    added = (p.pull if direction > 0.0 else p.push) + p.regressed + p.by_load * load
     if p.load_nodes > 0:
         added += along(p.load_curve, p.load_nodes, load)
     return max(added, -p.running)

@@ -1,4 +1,4 @@
-"""Data of the host in a record, as inputs of replays: its services, and missed frames."""
+"""Data of the host in a record, as inputs of replays: feel, services, and missed frames."""
 
 from __future__ import annotations
 
@@ -11,6 +11,26 @@ from coupled.rig.serving import ServiceRows
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+
+
+class Feel(NamedTuple):
+    """What the host specifies at each frame, of shape (frames,).
+
+    `gradient` and `second` are G_T in N/d below and beyond the break. A schedule of a curve takes
+    the host's q̄, `pressure` in Pa, in place of both, and `left`, the share that has not failed.
+    """
+
+    gradient: Floats
+    second: Floats | None = None
+    pressure: Floats | None = None
+    left: Floats | float = 1.0
+
+    def rows(self) -> Floats:
+        """Return G_T twice, q̄ and the share, of shape (4, frames)."""
+        none = np.zeros_like(self.gradient)
+        second = self.gradient if self.second is None else self.second
+        pressure = none if self.pressure is None else self.pressure
+        return np.stack((self.gradient, second, pressure, none + self.left))
 
 
 class Hosted(NamedTuple):
@@ -57,6 +77,26 @@ class Hosted(NamedTuple):
 
 
 HOSTED = Hosted()
+
+
+class OtherInputs(NamedTuple):
+    """Inputs of the loader beside force and motion, at each frame; without one, no effect of it.
+
+    `load_factor` is +1 in level flight; `regressor` is r − r₀ of the rig file's regressor, in its
+    unit.
+    """
+
+    load_factor: Floats | None = None
+    regressor: Floats | None = None
+
+    def rows(self, frames: int) -> Floats:
+        """Return the load factor and r − r₀, of shape (2, frames)."""
+        level = np.ones(frames) if self.load_factor is None else self.load_factor
+        away = np.zeros(frames) if self.regressor is None else self.regressor
+        return np.stack((level, away))
+
+
+NO_INPUTS = OtherInputs()
 
 
 def held_over(signal: Floats, missed: Mask | None) -> Floats:

@@ -11,8 +11,19 @@ being the servo's position:
     x = δ − bend(F),     u + (2ζp/ω)·u' = x + (2ζ/ω)·x' + x''/ω²
 
 Backlash lies between the imposed motion and the loader, which follows once the backlash is closed.
-While it is open the force is zero, and the loader moves by its own springs against its damping. A
-backlash with a contact stiffness also bends by F/stiffness.
+While it is open the force is zero, and the loader moves by its own springs against its damping.
+
+A contact with a stiffness k, with a backlash or without, yields by z = δ − x. The force of its
+spring and damper is that of the loader, of which the loader's mean speed u over a substep of h
+seconds is found (implicit midpoint rule):
+
+    k·(|z| − play/2)·sgn(z) + k·τ·z' = 2m·(u − v)/h + c·u + friction + breakout·sgn(x) + springs(x)
+                                       + F_mod − F_offset + b·(n_z − 1)
+
+The left side is 0 in the backlash, and a contact with a backlash does not pull. The damper is that
+of a friction's contact, k·τ = 0.3·√(k·m), with τ at most that of the linkage, and h/8 of numerical
+damping in addition. The right side increases with u, so that the solution is bracketed, and found
+by regula falsi (Illinois).
 
 Rigid friction holds a still loader, and one that turns, with any force up to its level, which the
 motion does not determine: the answer is an interval. It is given a presliding of 1e-4 of the
@@ -23,6 +34,7 @@ cannot contain it.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -35,25 +47,31 @@ from scipy.ndimage import maximum_filter1d, minimum_filter1d
 from coupled.record.channels import ControlName
 from coupled.rig.compiled import entry, stage
 from coupled.rig.control import ControlParameters
+from coupled.rig.declaration import Ends
 from coupled.rig.events import sign
 from coupled.rig.frame import set_product
 from coupled.rig.friction import (
+    CONTACT_DAMPING,
     added_friction,
     damping_along,
     deflect_bristles,
     running_friction,
 )
-from coupled.rig.inertia import set_inertia
-from coupled.rig.loader import LoaderState, set_external, start_loader
-from coupled.rig.modification import set_gradients
+from coupled.rig.hosted import NO_INPUTS, Feel, OtherInputs
+from coupled.rig.linkage import CONTACT_s
+from coupled.rig.loader import LoaderState, set_external, set_regressor, start_loader
+from coupled.rig.modification import ModificationState
 from coupled.rig.nodes import on_nodes
 from coupled.rig.packing import pack
 from coupled.rig.recorder import stamped
-from coupled.rig.replay import bent_by
+from coupled.rig.replay import bent_by, feel_as_recorded
 from coupled.rig.rig import Rig
-from coupled.rig.springs import apply_modification, elastic, relax
+from coupled.rig.services import soft_stop_force
+from coupled.rig.springs import apply_modification, elastic, relax, relaxing_mean
 
 Floats = NDArray[np.float64]
+SOLVES, SOLVED = 80, 1e-10  # most steps for a substep's speed, and their relative tolerance
+DAMPED = 0.125  # of a substep: a stiff contact's error falls to 60 % in each
 RIGID = 1e-4  # of the travel, presliding of a rigid contact here
 REST_s = 0.25  # a loader that moves by less than that presliding within this time is at rest
 
@@ -76,21 +94,19 @@ def answer_to(
     rig: Rig,
     control: ControlName,
     nodes: Floats,
-    gradient: Floats,
-    load_factor: Floats | None = None,
+    feel: Feel,
+    inputs: OtherInputs = NO_INPUTS,
 ) -> Answer:
     """Return a control's reaction force to an imposed motion.
 
-    `nodes` is the motion on the loader's nodes, d, `rig.substeps` for each frame and one more;
-    `gradient` G_T in N/d at each frame, `load_factor` +1 in level flight. In an open backlash the
-    force is exactly 0.
+    `nodes` is the motion on the loader's nodes, d, `rig.substeps` for each frame and one more. In
+    an open backlash the force is exactly 0.
     """
     packed = pack(rig, only=control)
     p, s = packed["parameters"].copy(), packed["state"].copy()
-    frames, h = len(gradient), 1.0 / (rig.frame_rate * rig.substeps)
-    level = np.ones(frames) if load_factor is None else load_factor
+    frames, h = len(feel.gradient), 1.0 / (rig.frame_rate * rig.substeps)
     answer, mass = np.zeros((6, len(nodes))), np.zeros(frames)
-    _answer(p, s, nodes, np.stack((gradient, level)), rig.substeps, h, answer, mass)
+    _answer(p, s, nodes, feel.rows(), inputs.rows(frames), rig.substeps, h, answer, mass)
     # Of the substep that ends at node n: force without inertia, mean speed, whether in contact, by
     # how much friction at rest may hold less and more, and the side to which it slips.
     force, speed, touched, less, more, slips = answer
@@ -134,8 +150,8 @@ def behind_linkage(
     """Return the motion behind the linkage on the loader's nodes, d, from that of the grip.
 
     `read` is the transducer's reading of δ at the frames, d, without its zero; `force_N` F at the
-    frames, N, which bends the structure, and `others_N` the forces on other controls. Backlash is
-    left out: in it the loader's own motion decides (`answer_to`).
+    frames, N, which bends the structure, and `others_N` the forces on other controls. Backlash and
+    its contact are left out: in them the loader's own motion decides (`answer_to`).
     """
     data = rig.controls[control]
     loader, length = data.loader, data.length
@@ -143,8 +159,6 @@ def behind_linkage(
     if loader.arc_geometry:
         true = length * np.arcsin(np.clip(read / length, -1.0, 1.0))
     place = true - bent_by(rig, control, force_N, others_N)
-    if loader.play > 0.0 and loader.play_stiffness > 0.0:
-        place = place - force_N / loader.play_stiffness
     nodes = on_nodes(rig, place)
     rate_Hz = rig.frame_rate * rig.substeps
     if loader.servo_frequency > 0.0:
@@ -179,16 +193,106 @@ def _left_alone(p: ControlParameters, loader: LoaderState, held: float, h: float
 
 
 @stage
-def _rubbing(p: ControlParameters, loader: LoaderState, dry: float, way: float, h: float) -> float:
-    """Return the friction over a displacement in h seconds, N, and advance its contact."""
-    rate = way / h
-    if p.friction.stiffness > 0.0:
-        loader.bent = deflect_bristles(p.friction, loader.bent, rate, way, loader.load)
-        return p.friction.stiffness * loader.bent
+def _most(p: ControlParameters, load: float, rate: float, side: float) -> float:
+    """Return the friction's largest size at a rate in d/s, towards a side, N."""
+    return running_friction(p.friction, rate) + added_friction(p.friction, load, side)
+
+
+@stage
+def _rubbing(p: ControlParameters, load: float, dry: float, way: float, h: float) -> float:
+    """Return the friction after a displacement in h seconds, N; `dry` is that before, N."""
+    rate, stiffness = way / h, p.friction.stiffness
+    if stiffness > 0.0:
+        return stiffness * deflect_bristles(p.friction, dry / stiffness, rate, way, load)
     if p.friction.dry == 0:
         return 0.0
-    most = running_friction(p.friction, rate) + added_friction(p.friction, loader.load, rate)
+    most = _most(p, load, rate, rate)
     return min(max(dry + most * way / (RIGID * p.loader.travel), -most), most)
+
+
+@stage
+def _smooth(
+    p: ControlParameters,
+    m: ModificationState,
+    loader: LoaderState,
+    x: float,
+    rate: float,
+) -> float:
+    """Return the force against a motion at a place x, d, and rate, d/s, without friction, N.
+
+    Without the relaxing spring.
+    """
+    breakout = p.loader.breakout + (0.0 if p.loader.held else m.breakout)
+    force = elastic(p.loader, m, loader, x) - loader.external + breakout * sign(x)
+    force += loader.damping * rate + damping_along(p.friction, rate)
+    return force - soft_stop_force(p.services, x, rate)
+
+
+@stage
+def _beyond(
+    p: ControlParameters,
+    m: ModificationState,
+    loader: LoaderState,
+    dry: float,
+    ends: Ends,
+    u: float,
+    h: float,
+) -> tuple[float, float]:
+    """Return the loader's force at a mean speed, N, and by how much it exceeds the contact's, N.
+
+    `ends` are the imposed places before and after h seconds, d, `u` the loader's speed in d/s.
+    """
+    middle = loader.computed + 0.5 * u * h
+    force = 2.0 * loader.mass * (u - loader.rate) / h + _smooth(p, m, loader, middle, u)
+    force += _rubbing(p, loader.load, dry, u * h, h)
+    if p.loader.relaxing > 0.0:
+        kept, damping = relaxing_mean(p.loader, loader, h)
+        force += kept + damping * u
+    half, stretched = 0.5 * p.linkage.play, 0.5 * (ends[0] + ends[1]) - middle
+    side = sign(stretched)
+    pressed, rate = abs(stretched) - half, (ends[1] - ends[0]) / h - u
+    damps = min(CONTACT_DAMPING * math.sqrt(loader.mass / p.linkage.contact), CONTACT_s)
+    pull = p.linkage.contact * (pressed + (damps + DAMPED * h) * side * rate)
+    if half > 0.0:
+        pull = max(pull, 0.0) if pressed > 0.0 else 0.0
+    return force, force - side * pull
+
+
+@stage
+def _speed_by_contact(
+    p: ControlParameters,
+    m: ModificationState,
+    loader: LoaderState,
+    dry: float,
+    ends: Ends,
+    h: float,
+) -> float:
+    """Return a loader's mean speed over h seconds behind a contact that yields, d/s."""
+    u = loader.rate
+    force, off = _beyond(p, m, loader, dry, ends, u, h)
+    scale = abs(force) + abs(force - off)
+    least = 2.0 * loader.mass / h + loader.damping
+    other, beyond = u, off
+    step = abs(off) / least
+    for _ in range(SOLVES):
+        if beyond * off <= 0.0:
+            break
+        other = u - sign(off) * step
+        beyond = _beyond(p, m, loader, dry, ends, other, h)[1]
+        step *= 4.0
+    for _ in range(SOLVES):
+        if off == 0.0 or abs(other - u) <= SOLVED * (abs(u) + abs(other)):
+            break
+        new = (off * other - beyond * u) / (off - beyond)
+        now = _beyond(p, m, loader, dry, ends, new, h)[1]
+        if abs(now) <= SOLVED * scale:
+            return new
+        if now * beyond < 0.0:
+            u, off = other, beyond
+        else:
+            off *= 0.5
+        other, beyond = new, now
+    return u if abs(off) < abs(beyond) else other
 
 
 @entry
@@ -196,7 +300,8 @@ def _answer(
     parameters: Any,
     states: Any,
     nodes: Floats,
-    given: Floats,
+    feel: Floats,
+    inputs: Floats,
     substeps: int,
     h: float,
     answer: Floats,
@@ -204,41 +309,54 @@ def _answer(
 ) -> None:
     """Write force without inertia, N, speed, contact, friction's range and slip of each substep.
 
-    And each frame's mass, kg.
+    And each frame's mass, kg; 0 if the force includes the inertia, as that of a contact does.
     """
     p, s = parameters[0], states[0]
     m, loader = s.modification, s.loader
     start_loader(p.loader, loader, 0.0)
     loader.computed, half, dry = nodes[0], 0.5 * p.linkage.play, 0.0
+    soft = p.linkage.contact > 0.0
     for k in range(len(mass)):
-        set_gradients(p.modification, m, given[0, k], given[0, k])
-        set_inertia(p.inertia, s.inertia, p.loader, loader, given[0, k])
+        feel_as_recorded(p, s, feel, k, False, loader.computed)
         set_product(p, m, loader.computed, loader.computed)
-        set_external(p.loader, loader, given[1, k])
-        mass[k] = loader.mass
+        set_external(p.loader, loader, inputs[0, k])
+        set_regressor(p.loader, p.friction, loader, inputs[1, k])
+        mass[k] = 0.0 if soft else loader.mass
         for node in range(k * substeps + 1, min((k + 1) * substeps + 1, len(nodes))):
             if p.loader.held:
                 apply_modification(p.loader, m, loader, loader.computed)
                 apply_modification(p.loader, m, loader, loader.computed)
-            held = elastic(p.loader, m, loader, loader.computed) + loader.relaxed - loader.external
-            alone = loader.computed if half == 0.0 else _left_alone(p, loader, held, h)
-            new = min(max(alone, nodes[node] - half), nodes[node] + half)
-            way, loader.load = new - loader.computed, abs(answer[0, node - 1] + loader.external)
-            dry = _rubbing(p, loader, dry, way, h)
+            loader.load = abs(answer[0, node - 1] + loader.external)
+            if soft:
+                ends = (nodes[node - 1], nodes[node])
+                u = _speed_by_contact(p, m, loader, dry, ends, h)
+                way = u * h
+                answer[0, node] = _beyond(p, m, loader, dry, ends, u, h)[0]
+                stretched = 0.5 * (ends[0] + ends[1]) - loader.computed - 0.5 * way
+                touches = half == 0.0 or abs(stretched) > half
+                loader.rate = 2.0 * u - loader.rate
+            else:
+                held = elastic(p.loader, m, loader, loader.computed) + loader.relaxed
+                held -= loader.external
+                alone = loader.computed if half == 0.0 else _left_alone(p, loader, held, h)
+                new = min(max(alone, nodes[node] - half), nodes[node] + half)
+                way, touches = new - loader.computed, half == 0.0 or new != alone
+            dry = _rubbing(p, loader.load, dry, way, h)
             if p.loader.relaxing > 0.0:
                 relax(p.loader, loader, way, h)
-            loader.computed = new
+            loader.computed += way
             answer[1, node] = way / h
-            if half == 0.0 or new != alone:  # else there is no contact
-                breakout = p.loader.breakout + (0.0 if p.loader.held else m.breakout)
-                answer[2, node] = 1.0
-                force = elastic(p.loader, m, loader, new) + loader.relaxed - loader.external
-                force += loader.damping * way / h + damping_along(p.friction, way / h)
-                answer[0, node] = force + dry + breakout * sign(new)
-                if p.friction.rigid:
-                    holds = running_friction(p.friction, 0.0)
-                    answer[3, node] = holds + added_friction(p.friction, loader.load, -1.0) + dry
-                    answer[4, node] = holds + added_friction(p.friction, loader.load, 1.0) - dry
-                    slips = running_friction(p.friction, way / h)
-                    slips += added_friction(p.friction, loader.load, way / h)
-                    answer[5, node] = sign(dry) if abs(dry) >= slips else 0.0
+            if not touches:
+                answer[0, node] = 0.0
+                continue
+            answer[2, node] = 1.0
+            if not soft:
+                answer[0, node] = _smooth(p, m, loader, loader.computed, way / h)
+                answer[0, node] += loader.relaxed + dry
+            if p.friction.rigid:
+                answer[3, node] = dry + _most(p, loader.load, 0.0, -1.0)
+                answer[4, node] = _most(p, loader.load, 0.0, 1.0) - dry
+                slips = abs(dry) >= _most(p, loader.load, way / h, way / h)
+                answer[5, node] = sign(dry) if slips else 0.0
+            if soft:  # it carries the force of a turn, which is then determined
+                answer[5, node] = 1.0

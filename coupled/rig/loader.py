@@ -1,7 +1,10 @@
 """Loader: the electronics' mass-spring-damper, from the pilot's force to δc.
 
     m·δc'' + c·δc' + friction·sgn(δc') + breakout·sgn(δc) + springs(δc) + F_mod
-        = F(t − delay) + F_offset − b·(n_z − 1),      −forward ≤ δc ≤ aft, inelastic stops
+        = F(t − delay) + F_offset + a·(r − r₀) − b·(n_z − 1)
+
+within inelastic stops, −forward ≤ δc ≤ aft. r is a channel of a record, such as a temperature; in a
+flight it is r₀.
 
 F is the pilot's force, plus a share of that on another control by crosstalk (`crossing`).
 
@@ -62,6 +65,7 @@ class LoaderParameters(SpringParameters, DelayParameters, Protocol):
     breakout: float  # F_BO, N
     bob_weight: float  # b, N per g
     offset: float  # F_offset, N, in the direction of the pilot's force
+    by_regressor: float  # a, N for each unit of the regressor
     travel: float  # of the control to either side, d
     aft: float  # stop of δc on the positive side, d: the travel, or a stop within it
     forward: float  # and on the negative side, as a size
@@ -77,7 +81,7 @@ class LoaderState(SpringState, DelayState, Protocol):
     load: float  # force on the loader, N, for friction that grows with it
     bent: float  # deflection of a friction's contact, d
     leaked: float  # crosstalk of another control's force, N, at the next node
-    external: float  # F_offset − b·(n_z − 1), N, held over the frame
+    external: float  # F_offset + a·(r − r₀) − b·(n_z − 1), N, held over the frame
     loose: int  # the springs follow the control, without breakout
     stop: int  # the stop reached during this frame: −1, 0 or +1
 
@@ -93,6 +97,7 @@ LOADER = Declaration(
     derived=DERIVED
     | {
         "delay_substeps": lambda g: g.control.loader.delay / g.substep_s,
+        "by_regressor": lambda g: g.control.loader.regressor_force,
         "travel": lambda g: g.control.travel,
         "aft": lambda g: stop_of(g.control.pull, g.control.loader.stop_aft),
         "forward": lambda g: stop_of(g.control.push, g.control.loader.stop_forward),
@@ -106,6 +111,15 @@ LOADER = Declaration(
 def set_external(p: LoaderParameters, s: LoaderState, load_factor: float) -> None:
     """Set the forces that are constant over a frame; load factor is +1 in level flight."""
     s.external = p.offset - p.bob_weight * (load_factor - 1.0)
+
+
+@stage
+def set_regressor(
+    p: LoaderParameters, friction: FrictionParameters, s: LoaderState, away: float
+) -> None:
+    """Add the force of the regressor, and set its friction; `away` is r − r₀, in its unit."""
+    s.external += p.by_regressor * away
+    friction.regressed = friction.by_regressor * away
 
 
 @stage

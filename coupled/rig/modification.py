@@ -278,9 +278,9 @@ def convert_curve(s: ModificationState, step: float, full_scale: float) -> None:
 
 @seldom
 def local_gradient(p: ModificationParameters, s: ModificationState, computed: float) -> float:
-    """Return the specified curve's G_T at δc in d, N/d: the inverse of eq. (12)."""
-    at_computed = slope(s, computed) / (p.made * p.multiplied) + p.basic_gradient
-    return felt_gradient(at_computed, assumed_bend(p))
+    """Return the specified curve's G_T at δc as read, d, in N/d: the inverse of eq. (12)."""
+    sent = slope(s, computed / p.multiplied) / (p.made * p.multiplied)
+    return felt_gradient(sent + p.basic_gradient, assumed_bend(p))
 
 
 @stage

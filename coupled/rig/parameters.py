@@ -21,6 +21,7 @@ from coupled.rig.curves import (
     ForceReading,
     FrictionCurve,
     GradientCurve,
+    GripLoad,
     LoadCurve,
     SpringCurve,
 )
@@ -59,6 +60,10 @@ class Loader(Section):
     friction_pull: float = quantity("N", 0.0, ge=0)
     friction_push: float = quantity("N", 0.0, ge=0)
     friction_by_load: float = quantity("", 0.0, ge=0, le=0.9)
+    regressor: PlainName | None = None
+    regressor_reference: float = quantity("", 0.0)
+    regressor_force: float = quantity("N_per_unit", 0.0)
+    regressor_friction: float = quantity("N_per_unit", 0.0)
     bob_weight: float = quantity("N_per_g", 0.0)
     offset: float = quantity("N", 0.0)
     cubic: float = quantity("N_per_{d}3", 0.0, ge=0)
@@ -147,9 +152,14 @@ class Schedule(Section):
         ]
 
     @property
+    def curved(self) -> bool:
+        """Whether a curve is specified, not gradients."""
+        return self.deflection is not None
+
+    @property
     def gradients(self) -> list[float]:
         """G_T at each pressure, N/d: up to the break, or the steepest gradient of a curve."""
-        if self.deflection is None:
+        if not self.curved:
             return self.total_gradient
         return [max(row) for row in zip(*self.segments, strict=True)]
 
@@ -206,6 +216,7 @@ class Sensing(Section):
     deflection_curve: DeflectionReading = DeflectionReading()
     force_curve: ForceReading = ForceReading()
     grip_curve: DeflectionReading = DeflectionReading()
+    grip_load_curve: GripLoad = GripLoad()
 
     @property
     def read_scale(self) -> float:

@@ -14,13 +14,22 @@ from numpy.typing import NDArray
 
 from coupled.rig.command import start_command, take_set_point
 from coupled.rig.compensation import estimate
-from coupled.rig.compiled import long_entry
-from coupled.rig.frame import set_product
-from coupled.rig.hosted import HOSTED, Hosted, Mask, held_over
-from coupled.rig.inertia import lead_force, set_inertia
+from coupled.rig.compiled import long_entry, stage
+from coupled.rig.control import ControlParameters, ControlState
+from coupled.rig.frame import set_feel, set_product
+from coupled.rig.hosted import (
+    HOSTED,
+    NO_INPUTS,
+    Feel,
+    Hosted,
+    Mask,
+    OtherInputs,
+    held_over,
+)
+from coupled.rig.inertia import lead_force
 from coupled.rig.linkage import advance_memory, deflection, move_linkage, start_bend, transducer
-from coupled.rig.loader import move_loader, set_external, start_loader
-from coupled.rig.modification import assume, assumed_bend, set_gradients
+from coupled.rig.loader import move_loader, set_external, set_regressor, start_loader
+from coupled.rig.modification import assume, assumed_bend
 from coupled.rig.nodes import on_nodes
 from coupled.rig.packing import crossed_bends, pack
 from coupled.rig.reach import bounds, set_reach
@@ -40,63 +49,46 @@ def replay_schedule(
     pressure_Pa: Floats,
     beyond: bool = False,
     missed: Mask | None = None,
+    computed: Floats | None = None,
 ) -> Floats:
     """Return G_T in N/d for the host's dynamic pressure at each frame.
 
     `beyond`: that beyond the break, on a rig of two segments; `missed` are the frames that the
-    host missed, never the first.
+    host missed, never the first. G_T of a curve is that at `computed`, δc about neutral as read, d.
     """
     p, s = _one(rig, control)
-    ran = pressure_Pa if missed is None else pressure_Pa[~missed]
-    made = np.asarray(_schedule(p, s, ran, np.empty((2, len(ran))))[int(beyond)])
-    return made if missed is None else made[np.cumsum(~missed) - 1]
-
-
-def replay_loader(
-    rig: Rig,
-    control: str,
-    force_N: Floats,
-    gradient: Floats,
-    misread: Floats,
-    load_factor: Floats | None = None,
-    second: Floats | None = None,
-    restart: Restart | None = None,
-) -> tuple[Floats, Floats]:
-    """Return δc in d and F_mod in N at each frame.
-
-    `gradient` is the schedule's G_T in N/d (`second` that beyond the break, if there is one),
-    `misread` the host's reading of δc less δc, d, for a digital product. The loader starts at rest
-    at neutral; with `restart`, it is reset to measured states.
-    """
-    nodes = on_nodes(rig, force_N)
-    return drive_loader(rig, control, nodes, gradient, misread, load_factor, second, restart)
+    ran = np.ones(len(pressure_Pa), dtype=np.bool_) if missed is None else ~missed
+    place = np.zeros_like(pressure_Pa) if computed is None else computed
+    made = _schedule(p, s, pressure_Pa[ran], place[ran], np.empty((2, int(ran.sum()))))
+    return np.asarray(made[int(beyond), np.cumsum(ran) - 1])
 
 
 def drive_loader(
     rig: Rig,
     control: str,
     nodes_N: Floats,
-    gradient: Floats,
+    feel: Feel,
     misread: Floats,
-    load_factor: Floats | None = None,
-    second: Floats | None = None,
+    inputs: OtherInputs = NO_INPUTS,
     restart: Restart | None = None,
     host: Hosted = HOSTED,
 ) -> tuple[Floats, Floats]:
-    """Return the same as `replay_loader`, with the force on the loader's nodes, linear between.
+    """Return δc in d and F_mod in N at each frame, with the force on the loader's nodes.
 
-    `nodes_N` has `rig.substeps` values for each frame and one more. The part of the services' force
-    held by the host is constant over a frame, the rest follows the spline. A digital product keeps
-    its last value in missed frames. G_T is as given.
+    `nodes_N` has `rig.substeps` values for each frame and one more, linear between. `misread` is
+    the host's reading of δc less δc, d, for a digital product. The loader starts at rest at
+    neutral; with `restart`, it is reset to measured states. The part of the services' force held by
+    the host is constant over a frame, the rest follows the spline. A digital product keeps its last
+    value in missed frames.
     """
     p, s = _one(rig, control)
-    level = np.ones_like(misread) if load_factor is None else load_factor
     out = np.empty((2, len(misread)))
     h = 1.0 / (rig.frame_rate * rig.substeps)
     none = np.zeros_like(misread)
     begun, position, rate = (none, none, none) if restart is None else restart
-    both = (gradient, gradient if second is None else second)
-    rows = (*both, misread, level, position, rate, *host.rows(len(misread)), begun)
+    frames = len(misread)
+    begins = (position, rate, *host.rows(frames), begun)
+    rows = (*feel.rows(), misread, *inputs.rows(frames), *begins)
     served = _served(rig, p, nodes_N, host)
     _loader(p, s, nodes_N, served, np.stack(rows), rig.substeps, h, out, np.empty(0))
     return out[0], out[1]
@@ -113,9 +105,9 @@ def drive_series(
     rig: Rig,
     control: str,
     nodes_N: Floats,
-    gradients: tuple[Floats, Floats | None],
+    feel: Feel,
     force_N: Floats,
-    load_factor: Floats | None = None,
+    inputs: OtherInputs = NO_INPUTS,
     host: Hosted = HOSTED,
     others_N: Mapping[str, Floats] | None = None,
     restart: Restart | None = None,
@@ -123,18 +115,14 @@ def drive_series(
     """Return the reading of the grip's transducer, d, from F alone: loader and linkage in series.
 
     `nodes_N` is the loader's input F in N on its nodes (with crosstalk), `force_N` F at the frames,
-    which bends the structure. `gradients` are G_T and that beyond the break. The other arguments
-    are those of `drive_loader` and `replay_linkage`. δc is predicted, not measured, and the host
-    reads it without error.
+    which bends the structure. The other arguments are those of `drive_loader` and `replay_linkage`.
+    δc is predicted, not measured, and the host reads it without error.
     """
     p, s = _one(rig, control)
     frames = len(force_N)
-    level = np.ones(frames) if load_factor is None else load_factor
     h, none = 1.0 / (rig.frame_rate * rig.substeps), np.zeros(frames)
-    gradient, second = gradients
-    both = (gradient, gradient if second is None else second)
     begun, position, rate = (none, none, none) if restart is None else restart
-    rows = (*both, none, level, position, rate, *host.rows(frames), begun)
+    rows = (*feel.rows(), none, *inputs.rows(frames), position, rate, *host.rows(frames), begun)
     given = np.stack(rows).astype(np.float64)
     computed = np.empty((frames - 1) * rig.substeps + 1)
     served = _served(rig, p, nodes_N, host)
@@ -146,20 +134,19 @@ def replay_product(
     rig: Rig,
     control: str,
     computed: Floats,
-    gradient: Floats,
-    second: Floats | None = None,
+    feel: Feel,
     missed: Mask | None = None,
     assumed: Floats | None = None,
 ) -> Floats:
-    """Return F_mod in N for δc in d at each frame and G_T in N/d.
+    """Return F_mod in N for δc in d about neutral at each frame.
 
     A digital product keeps its last value in the frames `missed` by the host. `assumed` is the
     difference of the host's K̂ in ΔG from the rig's, d/N.
     """
     p, s = _one(rig, control)
-    more = np.zeros_like(gradient) if assumed is None else assumed
-    given = np.stack((gradient, gradient if second is None else second, more))
-    made = _product(p, s, computed, given, np.empty_like(computed))
+    none = np.zeros_like(computed)
+    host = Hosted(missed=missed, assumed=assumed).rows(len(none))[3:]
+    made = _product(p, s, computed, feel.rows(), np.stack(host), none)
     return held_over(made, missed) if p[0]["modification"]["digital"] else made
 
 
@@ -249,11 +236,22 @@ def _one(rig: Rig, control: str) -> tuple[Any, Any]:
 
 
 @long_entry
-def _schedule(p: Any, s: Any, pressure: Floats, out: Floats) -> Floats:
+def _schedule(p: Any, s: Any, pressure: Floats, computed: Floats, out: Floats) -> Floats:
     for k in range(len(pressure)):
         read = read_pressure(p[0].schedule, s[0].schedule, pressure[k])
-        out[0, k], out[1, k] = gradients(p[0].schedule, read)
+        first, out[1, k] = gradients(p[0].schedule, read)
+        out[0, k] = set_feel(p[0], s[0], first, out[1, k], 1.0, computed[k])
     return out
+
+
+@stage
+def feel_as_recorded(
+    p: ControlParameters, s: ControlState, feel: Floats, k: int, missed: bool, computed: float
+) -> None:
+    """Set the feel of frame k from `Feel.rows`, at δc about neutral as the host read it, d."""
+    if p.schedule.nodes > 0 and not missed:
+        read_pressure(p.schedule, s.schedule, feel[2, k])
+    set_feel(p, s, feel[0, k], feel[1, k], feel[3, k], computed)
 
 
 @long_entry
@@ -268,15 +266,16 @@ def _loader(
     out: Floats,
     fine: Floats,
 ) -> None:
-    """Run the loader on the inputs `given`, shape (12, frames), and on forces at the nodes.
+    """Run the loader on the inputs `given`, shape (15, frames), and on forces at the nodes.
 
-    `given`: G_T twice, misread δc, load factor, restarts' δc and its rate, `Hosted.rows`, restarts.
-    Write δc and F_mod at the frames to `out`, and δc at every node to `fine`, unless that is empty.
+    `given`: `Feel.rows`, misread δc, `OtherInputs.rows`, restarts' δc and its rate, `Hosted.rows`,
+    restarts. Write δc and F_mod at the frames to `out`, and δc at every node to `fine`, unless that
+    is empty.
     """
     p, s = parameters[0], states[0]
-    gradient, misread, level, position, rate = given[:2], given[2], given[3], given[4], given[5]
-    neutral, held, jammed, missed = given[6], given[7], given[8], given[9]
-    assumed, begun = given[10], given[11]
+    feel, misread, level, away = given[:4], given[4], given[5], given[6]
+    position, rate, neutral, held = given[7], given[8], given[9], given[10]
+    jammed, missed, assumed, begun = given[11], given[12], given[13], given[14]
     bend = assumed_bend(p.modification)
     start_loader(p.loader, s.loader, force[0])
     frames, read = len(misread), 0.0
@@ -287,14 +286,14 @@ def _loader(
         if begun[k] > 0.5:
             s.loader.computed, s.loader.rate = position[k], rate[k]
         assume(p.modification, bend + assumed[k])
-        set_gradients(p.modification, m, gradient[0, k], gradient[1, k])
-        set_inertia(p.inertia, s.inertia, p.loader, s.loader, gradient[0, k])
         if missed[k] < 0.5:
             read = scaled_computed(p.sensing, s.loader.computed, k) + misread[k]
+        feel_as_recorded(p, s, feel, k, missed[k] > 0.5, read - neutral[k])
         s.loader.neutral = neutral[k]
         out[1, k] = set_product(p, m, s.loader.computed - neutral[k], read - neutral[k])
         out[0, k] = s.loader.computed
         set_external(p.loader, s.loader, level[k])
+        set_regressor(p.loader, p.friction, s.loader, away[k])
         if k + 1 < frames:
             base = s.loader.external
             s.loader.external = base + held[k]
@@ -315,11 +314,11 @@ def _loader(
 
 
 @long_entry
-def _product(p: Any, s: Any, computed: Floats, given: Floats, out: Floats) -> Floats:
+def _product(p: Any, s: Any, computed: Floats, feel: Floats, host: Floats, out: Floats) -> Floats:
     m, bend = s[0].modification, assumed_bend(p[0].modification)
     for k in range(len(out)):
-        assume(p[0].modification, bend + given[2, k])
-        set_gradients(p[0].modification, m, given[0, k], given[1, k])
+        assume(p[0].modification, bend + host[1, k])
+        feel_as_recorded(p[0], s[0], feel, k, host[0, k] > 0.5, computed[k])
         out[k] = set_product(p[0], m, computed[k], computed[k])
     return out
 

@@ -23,6 +23,7 @@ from coupled.files import check_target, write_text
 from coupled.record.channels import (
     CONTROL_NAMES,
     SURFACES,
+    control_channels,
     noisy_channels,
     unit_of,
 )
@@ -134,13 +135,7 @@ class Rig(RigData, Result):
         rig, or None to remove the aircraft. Raises InputError as a rig file does, with the name of
         this rig and the key.
         """
-        plain = dict(changes)
-        controls = {key: plain.pop(key) for key in changes if key.split(".")[0] == "controls"}
-        whole = changed(self, plain, self.name)
-        if controls:
-            given = _changed_controls(self, controls)
-            whole = changed(whole, {"controls": given}, self.name)
-        return of_file(checked(whole, self.name), self._filed)
+        return with_values(self, changes)
 
     def to_toml(self) -> str:
         """Return the text of a rig file, with the comments of the file that the rig came from."""
@@ -189,6 +184,15 @@ def _no_key(part: str, place: str, held: Mapping[str, Any]) -> str:
     if not held and place:
         return f"{place} has nothing within it"
     return f"no {part!r}; {nearest(part, held)}"
+
+
+def with_values(rig: Rig, changes: Mapping[str, Any]) -> Rig:
+    """Return what `Rig.changed` does, for code that calls it with a mapping of keys."""
+    plain = dict(changes)
+    controls = {key: plain.pop(key) for key in changes if key.split(".")[0] == "controls"}
+    if controls:
+        plain["controls"] = _changed_controls(rig, controls)
+    return of_file(checked(changed(rig, plain, rig.name), rig.name), rig._filed)
 
 
 def _changed_controls(rig: Rig, changes: Mapping[str, Any]) -> dict[str, Control]:
@@ -271,6 +275,7 @@ def _check_control(rig: Rig, name: str, control: Control, file: object) -> None:
     if loader.gravity > 0.0 and d == "m":
         problem = "acts on an axis that turns; this control moves along a line"
         raise InputError(file, f"{path}.loader.gravity_N", problem)
+    _check_regressor(control, name, file, f"{path}.loader")
     _check_servo(control, file, path)
     if loader.servo_frequency == 0.0:
         _check_without_servo(control, file, path, d)
@@ -282,13 +287,27 @@ def _check_control(rig: Rig, name: str, control: Control, file: object) -> None:
     check_guesses(control, file, path, d)
 
 
+def _check_regressor(control: Control, name: str, file: object, path: str) -> None:
+    """Refuse a regressor that the loader itself moves, and numbers of one that is not named."""
+    loader = control.loader
+    if loader.regressor in control_channels(name):
+        problem = f"is a channel of the {name} itself; give another, as a temperature"
+        raise InputError(file, f"{path}.regressor", problem)
+    for key in ("force_N_per_unit", "friction_N_per_unit"):
+        field = "regressor_" + key.partition("_")[0]
+        if loader.regressor is None and getattr(loader, field) != 0.0:
+            problem = "needs the name of a channel; give regressor"
+            raise InputError(file, f"{path}.regressor_{key}", problem)
+
+
 def _check_loader_curves(rig: Rig, control: Control, file: object, path: str, d: str) -> None:
     """Refuse curves by which the grip moves against the force, or which no step can follow."""
     loader, rate_Hz = control.loader, rig.frame_rate * rig.substeps
     least = loader.least_bend
     if (slope := min(loader.bend_curve.slopes, default=0.0)) < -least:
         problem = f"falls by {-slope:.3g} {d}/N, and K is {least:.3g} {d}/N: the grip may not move"
-        raise InputError(file, f"{path}.bend_curve.bend_{d}", f"{problem} against the force")
+        problem = f"{problem} against the force; of a reading give sensing.grip_load_curve"
+        raise InputError(file, f"{path}.bend_curve.bend_{d}", problem)
     if (slope := max(loader.load_curve.slopes, default=0.0)) > 0.9 - loader.friction_by_load:
         problem = f"rises by {slope:.3g} N/N; with friction_by_load it may rise by 0.9 at most"
         raise InputError(file, f"{path}.load_curve.friction_N", problem)
@@ -297,6 +316,8 @@ def _check_loader_curves(rig: Rig, control: Control, file: object, path: str, d:
         problem = f"falls by {-slope:.3g} N/{d}; at this mass and loader_rate_Hz give at most"
         raise InputError(file, f"{path}.force_curve.force_N", f"{problem} {most:.3g}")
     most, curve = loader.mass * rate_Hz, loader.friction_curve
+    if not curve.nodes:
+        return
     other = curve.model_copy(update={"force": curve.force_push})
     for key, one in (("force_N", curve), ("force_push_N", other)):
         if one.values and (slope := min(one.slopes, default=0.0)) < -most:

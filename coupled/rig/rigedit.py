@@ -20,15 +20,19 @@ def edited(text: str, changes: Mapping[tuple[str, ...], Any], remark: str = "") 
     A remark is put at its head. The text must be valid TOML.
     """
     document: Any = tomlkit.parse(text)
+    new: list[Any] = []
     for parts, value in changes.items():
         table = document
         for part in parts[:-1]:
             if part not in table:
                 table[part] = tomlkit.table()
+                new.append(table[part])
             table = table[part]
         table[parts[-1]] = value
+    for table in new:
+        table.add(tomlkit.nl())  # between it and the table that follows
     head = "".join(f"# {line}".rstrip() + "\n" for line in remark.splitlines())
-    return head + tomlkit.dumps(document)
+    return head + tomlkit.dumps(document).rstrip("\n") + "\n"
 
 
 def updated(text: str, rig: RigData, filed: Path, folder: Path | None = None) -> str:

@@ -65,6 +65,8 @@ def change(table: dict[str, Any], key: str, value: Any) -> bool:
 
 def rig_from_table(table: Mapping[str, Any], file: object) -> Rig:
     """Return a rig from the tables of a rig file; `file` is named in faults."""
+    if "rig" in table and not {"controls", "flight"} & table.keys():
+        raise InputError(file, "", "is a run file; give a rig")
     known = file_keys(Rig, "m")
     values = {key: value for key, value in table.items() if key in known}
     faults: list[InputError] = []

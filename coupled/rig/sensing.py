@@ -63,6 +63,8 @@ class SensingParameters(Protocol):
     force_curve: NDArray[np.float64]  # reading less true, N
     grip_nodes: int  # of the curve of the grip's transducer
     grip_curve: NDArray[np.float64]  # reading less true, d
+    load_nodes: int  # of the curve of what the force adds to it
+    load_curve: NDArray[np.float64]  # d over N
 
 
 class SensingState(Protocol):
@@ -91,7 +93,13 @@ def _step(of: str) -> Callable[[Given], float]:
 
 
 SENSING = Declaration(
-    layout(SensingParameters, computed_curve=SHAPE, force_curve=SHAPE, grip_curve=SHAPE),
+    layout(
+        SensingParameters,
+        computed_curve=SHAPE,
+        force_curve=SHAPE,
+        grip_curve=SHAPE,
+        load_curve=SHAPE,
+    ),
     section="control.sensing",
     derived={
         "read_scale": lambda g: g.control.sensing.read_scale,
@@ -110,6 +118,8 @@ SENSING = Declaration(
         "force_curve": lambda g: table_of(g.control.sensing.force_curve),
         "grip_nodes": lambda g: count_of(g.control.sensing.grip_curve),
         "grip_curve": lambda g: table_of(g.control.sensing.grip_curve),
+        "load_nodes": lambda g: count_of(g.control.sensing.grip_load_curve),
+        "load_curve": lambda g: table_of(g.control.sensing.grip_load_curve),
     },
     state=layout(SensingState),
 )
@@ -183,8 +193,10 @@ def read_force(p: SensingParameters, force: float, noise: float) -> float:
 
 
 @stage
-def read_grip(p: SensingParameters, shown: float) -> float:
-    """Return the grip's transducer's reading by its curve, d, without zero offset and noise."""
+def read_grip(p: SensingParameters, shown: float, force: float) -> float:
+    """Return the grip's transducer's reading by its curves, d, without zero offset and noise."""
     if p.grip_nodes > 0:
         shown += along(p.grip_curve, p.grip_nodes, shown)
+    if p.load_nodes > 0:
+        shown += along(p.load_curve, p.load_nodes, force)
     return shown

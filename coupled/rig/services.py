@@ -212,7 +212,7 @@ def _backdrive(
 
 
 @stage
-def _soft_stop(p: ServicesParameters, x: float, v: float) -> float:
+def soft_stop_force(p: ServicesParameters, x: float, v: float) -> float:
     """Return the soft stop's force, N."""
     beyond = abs(x) - p.soft_stop
     if p.soft_stop == 0.0 or beyond <= 0.0:
@@ -282,7 +282,7 @@ def serve(
     """
     x, v = loader.computed, loader.rate
     s.force = _release(p, s, loader)
-    s.force += s.slow + _backdrive(p, s, x, v, hand, h) + _soft_stop(p, x, v)
+    s.force += s.slow + _backdrive(p, s, x, v, hand, h) + soft_stop_force(p, x, v)
     if s.shaking:
         s.force += p.shaker * math.sin(2.0 * math.pi * p.shaker_frequency * s.time)
         s.time += h

@@ -7,6 +7,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple, cast
 
@@ -129,6 +130,8 @@ def check_service(
     if needed and getattr(data.services, needed) == 0.0:
         problem = f"does nothing without controls.{control}.services.{key} of the rig"
         raise InputError(file, f"{place}.service", problem)
+    if not math.isfinite(to):
+        raise InputError(file, f"{place}.to", f"is {to}; give a number")
     most = SERVICES[known[service]][2]
     if most is not None and not 0.0 <= to <= most:
         raise InputError(file, f"{place}.to", f"is {to:g}; a share or a switch, from 0 to 1")

@@ -42,17 +42,13 @@ from coupled.rig.compiled import (
 from coupled.rig.control import CONTROL, ControlArray, ControlParameters, ControlState
 from coupled.rig.crossing import leaks
 from coupled.rig.equations import basic_force, specified_force
+from coupled.rig.frame import set_feel, set_product
 from coupled.rig.linkage import LinkageParameters, bend, contact_displacement
-from coupled.rig.modification import (
-    convert_curve,
-    set_curve,
-    set_gradients,
-    smooth_force,
-)
+from coupled.rig.modification import smooth_force
 from coupled.rig.packing import crossed_bends, pack
 from coupled.rig.rig import Rig
 from coupled.rig.schedule import gradients
-from coupled.rig.sensing import converted, scaled_computed, scaled_force
+from coupled.rig.sensing import scaled_computed, scaled_force
 from coupled.rig.springs import curved, limited, ripple, weight
 from coupled.rig.surface import static_command
 
@@ -207,18 +203,11 @@ def _line(
 @stage
 def _set(p: ControlParameters, s: ControlState, pressure: float) -> int:
     """Set the modification of the state's frame; return that frame."""
-    m, sensing = s.modification, p.sensing
-    frame = m.frames
-    seen = p.schedule.pressure_scale * pressure
-    first, second = gradients(p.schedule, seen)
-    set_gradients(p.modification, m, first, second)
-    if p.schedule.nodes > 0:
-        set_curve(p.modification, m, p.schedule, seen, 1.0)
-    if m.curved and p.modification.digital == 0:
-        convert_curve(m, sensing.gradient_step, sensing.gradient_range)
-    elif p.modification.digital == 0:
-        m.first = converted(m.first, sensing.gradient_step, sensing.gradient_range)
-        m.second = converted(m.second, sensing.gradient_step, sensing.gradient_range)
+    m, frame = s.modification, s.modification.frames
+    s.schedule.pressure = p.schedule.pressure_scale * pressure
+    first, second = gradients(p.schedule, s.schedule.pressure)
+    set_feel(p, s, first, second, 1.0, 0.0)
+    set_product(p, m, 0.0, 0.0)
     return int(frame)
 
 

@@ -76,23 +76,6 @@ class Structure(Compliance):
         return self.diagonal and self.assumed.diagonal
 
 
-def lost_deflections(compliance: Floats, gradients: Floats, deflections: Floats) -> Floats:
-    """Return the deflections lost by the surfaces, d, if each pilot feels G_i·δ_i: K·G·δ, eq. (7a).
-
-    `compliance` is the whole K in d/N, shape (n, n), `gradients` G in N/d, `deflections` δ in d.
-    """
-    return np.asarray(compliance @ (gradients * deflections))
-
-
-def hand_forces(compliance: Floats, on_computed: Floats, deflections: Floats) -> Floats:
-    """Return F in N if each loader holds F_i = g_i·δc_i: (1 + g·K)⁻¹·g·δ.
-
-    `on_computed` is g in N/d, `deflections` δ in d; the whole `compliance` in d/N.
-    """
-    left = np.eye(len(on_computed)) + on_computed[:, None] * compliance
-    return np.asarray(np.linalg.solve(left, on_computed * deflections))
-
-
 def whole(controls: Mapping[str, Control], terms: Compliance) -> Floats:
     """Return the whole K, d/N: the loaders' bends and the off-diagonal terms, controls in order."""
     bends = [min(_bends(control)) for control in controls.values()]

@@ -81,6 +81,10 @@ class Switches:
         name, place = self._control(control), f"{control}.{what}"
         if what not in KEYS:
             raise InputError("switch", place, f"is no switch; {nearest(what, KEYS)}")
+        if what in YES_NO and value not in (0.0, 1.0):
+            raise InputError("switch", place, f"is {value:g}; give True or False")
+        if what not in YES_NO and isinstance(value, bool):
+            raise InputError("switch", place, f"is {value}; give a number")
         if what in HARDWARE and self._real_loader:
             raise InputError("switch", place, "is set on the real loader itself; change it there")
         if what in _WIDEST and value > _WIDEST[what]:

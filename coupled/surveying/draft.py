@@ -126,7 +126,7 @@ def _flight(found: Surveyed, folder: str) -> list[str]:
             f"  # it trims and answers from {found.slowest:g} to {found.fastest:g} m/s, as tried"
         )
     lines.append(speed)
-    if not found.direct:
+    if not flight.direct_controls:
         lines.append("direct_controls = false         # a law or lag of the model's own is between")
     if flight.properties:
         lines += ["", "[flight.properties]"]
@@ -145,9 +145,12 @@ def _control(control: ControlName, guess: Hardware, found: Surveyed) -> list[str
     softest = max(stiffest * low / high, 0.05 * stiffest)
     rows = (low, high) if high > 1.05 * low else (0.0, high)
     gradients = (softest, stiffest) if high > 1.05 * low else (stiffest, stiffest)
+    flight = found.flight
+    surface = flight.surfaces.get(control) if flight else None
     return control_lines(
         control,
         guess,
+        position=surface.position if surface else (),
         gradients=gradients,
         pressures=rows,
         bend=bend,
@@ -166,6 +169,7 @@ def control_lines(
     gradients: Sequence[float],
     pressures: Sequence[float],
     bend: float,
+    position: Sequence[str] = (),
     servo: bool = True,
     known: Collection[str] = (),
     remarks: Mapping[str, str] | None = None,
@@ -173,7 +177,8 @@ def control_lines(
     """Return the lines of a control of a rig file: SI, at the grip.
 
     `known` are the fields, as `loader.mass`, that were measured: all others are listed as
-    guesses. `remarks` are comments by field, and "schedule" for one above its table.
+    guesses. `position` are the model's own properties of the surface. `remarks` are comments by
+    field, and "schedule" for one above its table.
     """
     d, at, said = unit_of(control), f"controls.{control}", remarks or {}
     length = RIM_m if d == "rad" else 0.6
@@ -209,6 +214,7 @@ def control_lines(
         "",
         f"[{at}]",
         f'surface = "{SURFACES[control]}"',
+        *([f"surface_property = {json.dumps(position)}"] if position else []),
         *(row(*each) for each in own),
         *(["guesses = [", *guesses, "]"] if guesses else []),
         "",

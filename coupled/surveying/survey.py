@@ -12,6 +12,7 @@ holds is preferred: hands off for some seconds it neither meets the ground nor t
 from __future__ import annotations
 
 import math
+import re
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -26,9 +27,9 @@ from coupled.flight.direct import check_direct_controls
 from coupled.flight.modeltext import UnreadableModelError, parsed
 from coupled.record.channels import CONTROL_NAMES, PITCH, ROLL, ControlName
 from coupled.resources import aircraft_folder, shipped_rigs
-from coupled.rig.parameters import Flight
+from coupled.rig.parameters import Flight, SurfaceProperties
 from coupled.schema import load_toml
-from coupled.units import FOOT_m
+from coupled.units import DEGREE_rad, FOOT_m
 
 FRAME_s = 1.0 / 120.0
 _LIFT = (0.4, 0.25, 0.6, 0.15, 0.9, 0.08, 1.3)  # lift coefficients at the empty weight, in order
@@ -41,6 +42,10 @@ _GEAR_UP = {"gear/gear-cmd-norm": 0.0}
 _HOLDS_s = 5.0
 _LONGEST_s = 12.0  # spent on one model
 _TURNED_rad = 0.5
+_STILL = "does not move its"  # of `check_direct_controls`
+_ANGLE = re.compile(r"fcs/.*pos-(rad|deg)")
+_STEP, _MOVED_rad = 0.05, 1e-4  # of a command, and of a surface that follows it
+_MOST_SURFACES = 4
 
 
 @dataclass(frozen=True)
@@ -48,8 +53,8 @@ class Surveyed:
     """What was found of a model; SI.
 
     `flight` is a state in which it trims and `holds` whether it keeps it hands off; without one,
-    `why` has the reason. `controls` are those that a rig can lead, `direct` whether they
-    all move their surface at once; `lacking` says what keeps the others out.
+    `why` has the reason. `controls` are those that a rig can lead; `lacking` says what keeps the
+    others out.
     """
 
     model: str
@@ -57,12 +62,16 @@ class Surveyed:
     holds: bool = False
     why: str = ""
     controls: tuple[ControlName, ...] = ()
-    direct: bool = True
     lacking: tuple[str, ...] = ()
     slowest: float = 0.0  # calibrated airspeed at which it flies so at that height, m/s
     fastest: float = 0.0
     mass_kg: float = 0.0  # empty
     rigs: tuple[str, ...] = ()
+
+    @property
+    def direct(self) -> bool:
+        """Whether the controls move their surfaces at once."""
+        return self.flight is None or self.flight.direct_controls
 
     def as_dict(self) -> dict[str, object]:
         """Return the findings by name, as JSON takes them."""
@@ -213,13 +222,12 @@ def survey(model: ModelFile, *, speeds: bool = False) -> Surveyed:
     if found is None:
         return Surveyed(model.label, None, why=why, rigs=rigs, mass_kg=mass)
     flight, holds = found
-    controls, direct, lacking = _controls(flight, home)
-    flight = flight.model_copy(update={"direct_controls": direct})
+    flight, controls, lacking = _controls(flight, home)
     slowest = fastest = flight.calibrated_airspeed
     if speeds and controls:
         slowest, fastest = speed_range(flight, home, controls)
     return Surveyed(
-        *(model.label, flight, holds, "", controls, direct, lacking),
+        *(model.label, flight, holds, "", controls, lacking),
         *(slowest, fastest, mass, rigs),
     )
 
@@ -233,7 +241,10 @@ def surveyed(word: str, model: ModelFile, airframe_only: bool = False) -> Survey
     if found.flight is None:
         raise InputError(word, "", f"does not trim wherever it was tried: {found.why}")
     if not found.controls and not airframe_only:
-        raise InputError(word, "", f"has no control that a rig could move: {found.lacking[0]}")
+        problem = f"has no control that a rig could move: {found.lacking[0]}"
+        problem += "; --airframe-only writes its aircraft: add a control, with the model's own"
+        problem += " command_property and surface_property"
+        raise InputError(word, "", problem)
     return found
 
 
@@ -252,8 +263,9 @@ def _tries(model: ModelFile) -> Iterator[Flight]:
         )
         if gear is None:
             raised = flight.model_copy(update={"properties": _GEAR_UP})
-            lacks = "has no property" in _trims(raised, model.home)
-            gear = {} if lacks else _GEAR_UP
+            problem = _trims(raised, model.home)
+            fixed = "has no property" in problem or "sets it itself" in problem
+            gear = {} if fixed else _GEAR_UP
         yield flight.model_copy(update={"properties": gear})
 
 
@@ -303,8 +315,23 @@ def _holds(flight: Flight, home: Path) -> bool:
     return math.isfinite(turned) and turned < _TURNED_rad
 
 
-def _controls(flight: Flight, home: Path) -> tuple[tuple[ControlName, ...], bool, tuple[str, ...]]:
-    """Return the controls that a rig can lead, whether at once, and what the others lack."""
+def _controls(
+    flight: Flight, home: Path
+) -> tuple[Flight, tuple[ControlName, ...], tuple[str, ...]]:
+    """Return the flight by its controls, those that a rig can lead, and what the others lack."""
+    asked, led, lacking = _led(flight, home)
+    still = [each.partition(":")[0] for each in lacking if _STILL in each]
+    own = {control: _moving_angles(flight, home, control) for control in still}
+    surfaces = {
+        control: SurfaceProperties(position=names) for control, names in own.items() if names
+    }
+    if not surfaces:
+        return asked, led, lacking
+    return _led(flight.model_copy(update={"surfaces": surfaces}), home)
+
+
+def _led(flight: Flight, home: Path) -> tuple[Flight, tuple[ControlName, ...], tuple[str, ...]]:
+    """Return what `_controls` does, by the surfaces' properties of the flight."""
     for direct in (True, False):
         asked = flight.model_copy(update={"direct_controls": direct})
         led, lacking = list[ControlName](), list[str]()
@@ -313,11 +340,40 @@ def _controls(flight: Flight, home: Path) -> tuple[tuple[ControlName, ...], bool
                 check_direct_controls(asked, FRAME_s, (control,), (home,), "model")
                 led.append(control)
             except InputError as error:
-                reason = error.problem.partition("direct controls: it ")[2] or error.problem
+                reason = error.problem.removeprefix(f"{flight.model} ")
+                reason = reason.removeprefix("has no direct controls: it ")
                 lacking.append(f"{control}: {reason.partition(';')[0]}")
         if "column" in led:
-            return tuple(led), direct, tuple(lacking)
-    return (), False, tuple(lacking)
+            return asked, tuple(led), tuple(lacking)
+    return asked, (), tuple(lacking)
+
+
+def _moving_angles(flight: Flight, home: Path, control: str) -> list[str]:
+    """Return the model's own positions in rad or deg that a control's command moves, all alike.
+
+    None if they differ, as a surface and its tab do.
+    """
+
+    def angles(command: float) -> dict[str, float]:
+        aircraft = make_aircraft(flight, FRAME_s, (control,), [home], "model")
+        for _ in range(round(1.0 / FRAME_s)):
+            aircraft.step((command, 0.0, 0.0))
+        reads = {name: aircraft.reader(name) for name in aircraft.names() if _ANGLE.fullmatch(name)}
+        return {name: read() for name, read in reads.items() if read is not None}
+
+    still, moved = angles(0.0), angles(-_STEP)
+    by_rad = {
+        name: (moved[name] - place) * (DEGREE_rad if name.endswith("deg") else 1.0)
+        for name, place in still.items()
+    }
+    found = [name for name, by in by_rad.items() if abs(by) > _MOVED_rad]
+    found = [
+        name
+        for name in found
+        if f"{name.removesuffix('deg')}rad" not in found or name.endswith("rad")
+    ]
+    alike = all(math.isclose(by_rad[name], by_rad[found[0]], rel_tol=1e-3) for name in found)
+    return found if alike and len(found) <= _MOST_SURFACES else []
 
 
 def speed_range(

@@ -215,7 +215,7 @@ def numbers_table(numbers: Sequence[Number]) -> Table:
     """Return each fitted number: as filed, as found, and its 95 % interval."""
     rows = []
     for one in numbers:
-        ends = "not determined"
+        ends = "not determined" if one.most is None else f"at most {figure(one.most)}"
         if one.interval is not None:
             ends = " to ".join(figure(end) for end in one.interval)
         rows.append((one.key, figure(one.filed), figure(one.found), ends))

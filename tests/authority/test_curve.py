@@ -6,15 +6,18 @@ import numpy as np
 import pytest
 
 from coupled.api.benches import bench as take_readings
-from coupled.api.flights import compare, fly
-from coupled.api.gaps import diagnose
+from coupled.api.flights import compare
 from coupled.authority.maps import loss_maps
 from coupled.authority.stability.limits import stability_limits
 from coupled.calibration.calibrate import calibrate
+from coupled.calibration.checks import ControlCheck
 from coupled.calibration.documentation import check_feel
-from coupled.errors import InputError
+from coupled.calibration.qualification import check_numbers
+from coupled.calibration.sweeps import BEYOND, SWEEP_s, TURN_s, sweep
 from coupled.flight.manoeuvre import configure
-from coupled.flight.pilot import Clamp, Step
+from coupled.flight.pilot import Clamp
+from coupled.plots.flights import draw_comparison
+from coupled.plots.readings import draw_readings
 from coupled.plots.rigs import draw_rig
 from tests.support.curves import COLUMN_N, CYCLIC, CYCLIC_N, SEGMENT, column, curved
 from tests.support.rigs import K_REPORT
@@ -42,6 +45,13 @@ def test_the_authority_lost_and_the_force_felt_are_the_closed_form_to_a_thousand
     felt = (held(computed) - 17.8) / slack
     assert flown.felt_ratio("uncompensated") == pytest.approx(felt, rel=1e-3)
     assert flown.felt_ratio("compensated") == pytest.approx(1.0, rel=1e-3)
+    (panel,) = (a for a in draw_comparison(flown).axes if a.get_ylabel() == "pilot's force, N")
+    (drawn,) = (one for one in panel.get_lines() if one.get_label() == "asked, specified")
+    at, force = np.asarray(drawn.get_xdata(), float) / 100.0, np.asarray(drawn.get_ydata(), float)
+    beyond = at > 0.0  # from the first point, the breakout
+    assert np.min(at[beyond]) < 1e-6
+    for node in (1e-4, *SEGMENT[1:3]):
+        assert np.interp(node, at[beyond], force[beyond]) == pytest.approx(held(node), rel=2e-3)
     for flight in flown:
         assert flight.outcome.loss == pytest.approx(flight.outcome.loss_closed_form, abs=2e-5)
 
@@ -75,12 +85,41 @@ def test_the_curve_is_the_reference_of_the_static_checks() -> None:
     assert any(check.name.startswith("force, out, positive") for check in failed)
 
 
+def test_a_slow_sweep_crosses_a_flat_curve_evenly() -> None:
+    """In the flat middle the hand overcomes friction and damping of the sweep's speed alone."""
+    rig = curved(CYCLIC, [CYCLIC_N], {"friction_N": 2.0})
+    swept = sweep(rig, "column", 0.0)
+    data = rig.controls["column"]
+    out = slice(0, int(np.argmax(swept.deflection)))
+    flat = (swept.deflection[out] > 0.003) & (swept.deflection[out] < 0.009)
+    speed = BEYOND * data.travel / (0.25 * SWEEP_s - TURN_s)
+    wanted = 2.0 + data.loader.damping * speed
+    assert swept.hand_force[out][flat] == pytest.approx(wanted, abs=0.01)
+    assert np.count_nonzero(flat) == pytest.approx(0.006 / speed * rig.frame_rate, rel=0.02)
+
+
+def test_a_breakout_that_is_not_felt_is_printed_as_zero() -> None:
+    check = ControlCheck("breakout, positive", 0.0, 2.4e-15, 60.0, 8.9, "N")
+    assert check_numbers(check) == ("0", "60", "8.9", "N")
+
+
 def test_a_calibration_of_a_rig_with_a_curve_finds_its_bend() -> None:
     rig = column({"friction_N": 0.0})
     found = calibrate(take_readings(rig, seed=2), rig)
     bend = found.line.bend
     assert abs(bend.value - K_REPORT) < 2.0 * bend.half_width
     assert bend.half_width < 0.1 * K_REPORT
+    drawn = draw_readings(found, "readings").axes[0].get_lines()
+    points, fits = (
+        [np.asarray(one.get_xydata(), float) for one in drawn if one.get_linestyle() == style]
+        for style in ("None", "-")
+    )
+    fit = np.concatenate([each[each[:, 0] != 0.0] for each in fits])
+    read = np.concatenate(points)
+    assert sorted(fit[:, 0]) == pytest.approx(sorted(read[:, 0]))
+    left = np.sum(read[:, 1]) - np.sum(fit[:, 1])
+    assert left == pytest.approx(np.sum(found.line.residual), abs=1e-9)
+    assert len({len(each) for each in fits}) == 1 and len(fits[0]) > 3
 
 
 def test_the_figure_has_the_specified_curve_beside_what_is_felt() -> None:
@@ -91,11 +130,3 @@ def test_the_figure_has_the_specified_curve_beside_what_is_felt() -> None:
     inside = (at > CYCLIC[0]) & (at < CYCLIC[-1])
     assert force[inside] == pytest.approx(np.interp(at[inside], CYCLIC, CYCLIC_N), abs=1e-6)
     assert "specified" in lines
-
-
-def test_a_diagnosis_refuses_a_curve_in_one_line() -> None:
-    rig = column()
-    flight = fly(rig, column=Step(force_N=60.0), duration_s=14, dynamic_pressure_Pa=3000.0)
-    with pytest.raises(InputError, match="which a diagnosis does not model") as refused:
-        diagnose(rig, flight.record)
-    assert refused.value.key == "controls.column.schedule.force_N"

@@ -16,7 +16,6 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-import resource
 import subprocess
 import sys
 import time
@@ -35,6 +34,7 @@ from coupled.resources import shipped_rigs
 from coupled.rig.rigfile import read_rig
 from tests.support.benchmarks import keep
 
+resource = pytest.importorskip("resource")  # not on Windows
 pytestmark = pytest.mark.bench
 
 ENOUGH = 1000  # flights: fewer are over before memory could grow, or a rate be sure
@@ -185,7 +185,7 @@ def processor_s(folder: Path, workers: int, flights: int) -> float:
         [sys.executable, "-m", "coupled", *words], cwd=folder, stdout=subprocess.DEVNULL, check=True
     )
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    return float(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
 
 
 def test_what_a_second_worker_and_the_rig_cost_of_processor_time(tmp_path: Path) -> None:

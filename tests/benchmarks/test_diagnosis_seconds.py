@@ -11,7 +11,6 @@ are the same, and the wall seconds of both stand side by side.
 from __future__ import annotations
 
 import os
-import resource
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -25,6 +24,7 @@ from coupled.record.record import Record
 from tests.support import gaps
 from tests.support.benchmarks import keep
 
+resource = pytest.importorskip("resource")  # not on Windows
 pytestmark = pytest.mark.bench
 Floats = NDArray[np.float64]
 

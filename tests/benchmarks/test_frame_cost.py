@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import os
 import re
-import resource
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,13 +19,17 @@ import pytest
 
 import coupled
 from coupled.flight.airframe import JSBSimAirframe
+from coupled.flight.everyframe import PlainAircraft, PlainFrames
 from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import Manoeuvre
 from coupled.flight.pilot.own import GivenForce
 from coupled.resources import shipped_runs
+from coupled.rig.compiled import bound, entry
+from coupled.rig.placed import Placed
 from tests.support.benchmarks import FRAME_BOUNDS, keep, kept_figures
 from tests.support.runs import shortened
 
+resource = pytest.importorskip("resource")  # not on Windows
 pytestmark = pytest.mark.bench
 
 FRAMES = 4800
@@ -70,6 +74,73 @@ def test_a_coupled_frame_costs_little_more_than_a_run(run: str, controls: int, m
     name = f"frame cost, {controls} control(s)"
     keep(name, {**kept_figures(name), run: ratio}, load)
     assert ratio <= most
+
+
+def only_the_rig(spent: list[float]) -> Callable[[PlainAircraft, Placed], PlainFrames]:
+    """Return `plain_frames` without the aircraft's step; each flight adds its time, s."""
+
+    def frames(aircraft: PlainAircraft, placed: Placed) -> PlainFrames:
+        placed.connect(aircraft.connection)
+        rig_frame, address = placed.fly, placed.address
+
+        def fly(first: int, last: int) -> int:
+            start = time.thread_time()
+            for k in range(first, last):
+                rig_frame(address, k, True)
+            spent[-1] += time.thread_time() - start
+            return last
+
+        return fly
+
+    return frames
+
+
+def empty_s(frames: int) -> float:
+    """Return the time of as many calls of compiled code that does nothing."""
+    nothing = bound(entry(_nothing), 1, 1, True)
+    start = time.thread_time()
+    for k in range(frames):
+        nothing(1, k, True)
+    return time.thread_time() - start
+
+
+def _nothing(address: int, k: int, checked: bool) -> bool:
+    return False
+
+
+@pytest.mark.parametrize("controls", FRAME_BOUNDS)
+@pytest.mark.parametrize("run", ["pull-up-c172p", "pull-up-737"])
+def test_where_the_time_of_a_frame_goes(
+    run: str, controls: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In µs: `run()` in trim, the rig's compiled frame without it, the call of such a frame.
+
+    The rest is what `run()` takes longer in a manoeuvre, and both with the caches shared.
+    """
+    load = os.getloadavg()[0]
+    long, short = shortened(run, controls, FRAMES), shortened(run, controls, 1)
+    flown_s(short)
+    times: dict[str, list[float]] = {"run()": [], "frame": [], "rig": [], "call": []}
+    starts = list[float]()
+    for _ in range(ROUNDS):
+        times["run()"].append(bare_s(long))
+        starts.append(flown_s(short))
+        times["frame"].append(flown_s(long))
+        rig = [0.0]
+        with monkeypatch.context() as patched:
+            patched.setattr("coupled.flight.airframe.plain_frames", only_the_rig(rig))
+            flown_s(long)
+        times["rig"] += rig
+        times["call"].append(empty_s(FRAMES))
+    part = {name: 1e6 * min(each) / FRAMES for name, each in times.items()}
+    part["frame"] -= 1e6 * min(starts) / FRAMES
+    part["rest"] = part["frame"] - part["run()"] - part["rig"]
+    said = ", ".join(f"{name} {value:.2f}" for name, value in part.items())
+    print(f"\n{run}, {controls} control(s), µs: {said}")
+    name = f"frame parts, {controls} control(s)"
+    more = {f"{run}, {each}_us": value for each, value in part.items()}
+    keep(name, {**kept_figures(name), **more}, load)
+    assert part["call"] < part["rig"] < part["run()"]
 
 
 STEP_BOUND = 1.15  # times a frame of `fly`, with one control
@@ -130,7 +201,7 @@ def processor_s(command: list[str], folder: Path) -> float:
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     subprocess.run(command, check=True, timeout=120, cwd=folder, capture_output=True)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    return float(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
 
 
 STARTS = {

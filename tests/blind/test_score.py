@@ -335,3 +335,30 @@ def test_an_invalid_diagnosis_is_refused(trials: Path, tmp_path: Path) -> None:
 def test_the_seal_is_the_hash_of_the_key() -> None:
     text = Key(1, 1, "s", {}).text()
     assert hashlib.sha256(text.encode()).hexdigest() in Seal(digest(text)).text()
+
+
+@pytest.mark.parametrize(("control", "exact"), [("wheel", True), ("pedals", False)])
+def test_of_a_whole_aircraft_an_effect_counts_on_its_own_control_alone(
+    tmp_path: Path, control: str, exact: bool
+) -> None:
+    effects = (
+        TrueEffect("roll_damping", "airframe", {"factor": 0.7}),
+        TrueEffect("wheel.inertia", "wheel.loader", {"factor": 1.4}),
+    )
+    both = Truth("pair", "c172p", effects=effects, stages=("airframe", "wheel.loader"))
+    number = {"factor": {"value": 1.4, "low": 1.3, "high": 1.5}}
+    found = diagnosis("effect", "inertia", rivals=[["inertia", "viscous_damping"]])
+    found["effects"] = [
+        {"name": "roll_damping", "stage": "airframe", "probability": 0.9, "parameters": {}},
+        {
+            **{"name": "inertia", "stage": f"{control}.loader", "probability": 0.9},
+            **{"control": control, "parameters": number},
+        },
+    ]
+    found["stages"] = {name: {"guilty": True} for name in ("airframe", f"{control}.loader")}
+    (tmp_path / "r001.json").write_text(json.dumps(found))
+    (answer,) = read_answers(tmp_path, Key(5, 1, "salt", {"r001": both}))
+    assert (answer.exact, answer.stage_right) == (exact, exact)
+    assert f"{control}.viscous_damping" in answer.possible
+    held = answer.interval("wheel.inertia", "factor")
+    assert (held is not None and held.holds(1.4)) == exact

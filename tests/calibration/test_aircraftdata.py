@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 
 from coupled.calibration.aircraftdata import read_aircraft_data
 from coupled.calibration.documentation import check_feel
-from coupled.calibration.specification import specified_rig
+from coupled.calibration.specification import LEGS, specified_rig
 from coupled.errors import InputError
 from coupled.resources import shipped_rigs
 from coupled.rig.equations import specified_force
@@ -101,6 +102,24 @@ def test_friction_is_the_aircrafts_where_directions_were_noted(tmp_path: Path) -
     rubbing = aircraft.changed({"controls.column.loader.friction_N": FRICTION + 30.0})
     assert failing(rubbing, written(tmp_path, rows(aircraft, 1500.0)))
     assert not failing(rubbing, written(tmp_path, rows(aircraft, 1500.0, directions=False)))
+
+
+def test_a_sweep_in_order_needs_no_directions(tmp_path: Path) -> None:
+    """Out and back at places of their own; each row had been taken as the mean of both."""
+    rig, lines = bench(RIG), []
+    turns = (0.0, 0.17, -0.17, 0.0)
+    for begun, ended in pairwise(turns):
+        for place in np.linspace(begun, ended, 41 if begun and ended else 21)[1:-1]:
+            force = specified_at(rig, 1500.0, place) + FRICTION * np.sign(ended - begun)
+            if place != 0.0:
+                lines.append(f"1500,{place:.6f},{force:.6f},")
+    data = specified_rig(rig).controls["column"]
+    legs = read_aircraft_data(written(tmp_path, lines), "column", data).legs[1500.0]
+    for leg, (side, motion) in zip(legs, LEGS.values(), strict=True):
+        wanted = [specified_at(rig, 1500.0, place) for place in leg.deflection]
+        assert len(leg.deflection) > 15
+        assert leg.force == pytest.approx(np.array(wanted) + side * motion * FRICTION, abs=1e-3)
+    assert not failing(rig, tmp_path / "aircraft.csv")
 
 
 def test_data_in_us_units_and_one_direction_are_judged_in_that_direction(tmp_path: Path) -> None:

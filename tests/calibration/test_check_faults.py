@@ -43,6 +43,7 @@ FAULTS: dict[str, dict[str, float]] = {
     "stiffening_bend": {"bend_{d}_per_N": K_REPORT, "limit_{d}": 5e-3},
     "backlash": {"play_{d}": 0.03},
     "soft_backlash": {"play_{d}": 0.03, "stiffness_N_per_{d}": 1e4},
+    "yielding_contact": {"stiffness_N_per_{d}": 1e4},
     "bend_hysteresis": {"bend_{d}_per_N": 1.5 * K_REPORT, "share": 0.5, "width_N": 60.0},
     "structural_mode": {
         "bend_{d}_per_N": 2.0 * K_REPORT,
@@ -79,6 +80,8 @@ UNSEEN = {
     "crosstalk": "other controls are free",
     "arc_geometry": "0.7 % at 11° is within tolerance",
     "gravity": "a column does not turn",
+    "regressor_force": "the regressor keeps its reference",
+    "regressor_friction": "the regressor keeps its reference",
 }
 
 

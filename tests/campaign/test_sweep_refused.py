@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import resource
 from pathlib import Path
 
 import pytest
@@ -60,6 +59,7 @@ def test_two_sweeps_into_one_folder_are_refused_in_one_line(folder: Path) -> Non
 
 
 def test_a_full_disk_is_one_line_and_keeps_the_finished_flights(folder: Path) -> None:
+    resource = pytest.importorskip("resource")  # not on Windows
     plan, limits = plan_of(folder), resource.getrlimit(resource.RLIMIT_FSIZE)
     try:
         with opened(folder / "o", plan) as journal:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import resource
 import sqlite3
 import subprocess
 import sys
@@ -115,6 +114,7 @@ def test_a_library_s_warning_is_a_line_without_a_path(capsys: pytest.CaptureFixt
 @contextmanager
 def full_disk() -> Iterator[None]:
     """Let each file take 20 kB, as a disk that is full: what is too large raises as there."""
+    resource = pytest.importorskip("resource")  # not on Windows
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, before[1]))
     try:

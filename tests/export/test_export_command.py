@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
+from coupled.exporting.alone import PROGRAM
 from coupled.resources import shipped_rigs
 from tests.support.commands import coupled, files
 
@@ -84,3 +87,21 @@ def test_a_key_that_is_not_exported_is_named_with_its_file(tmp_path: Path) -> No
     assert done.returncode == 2
     assert "controls.column.sensing.gauge_mass_kg" in done.stderr.replace("\n", "")
     assert files(tmp_path) == {"rig.toml"}
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ((), "python fly.py scripts/NAME.xml"),
+        (("scripts/pul.xml",), "scripts/pul.xml: there is no such file"),
+        (("fly.py",), "fly.py does not load"),
+    ],
+)
+def test_the_program_of_an_export_refuses_what_it_cannot_fly(
+    tmp_path: Path, words: tuple[str, ...], said: str
+) -> None:
+    (tmp_path / "fly.py").write_text(PROGRAM, encoding="utf-8")
+    call = [sys.executable, "fly.py", *words]
+    done = subprocess.run(call, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert said in done.stderr and "Traceback" not in done.stderr

@@ -9,7 +9,7 @@ import pytest
 from scipy.signal import bilinear, lfilter
 
 from coupled.flight.aircraft import make_aircraft
-from coupled.flight.gusts import Gusts, dryden, dryden_filter
+from coupled.flight.gusts import GivenAir, Gusts, dryden, dryden_filter
 from coupled.record.channels import ALPHA, LOAD, SPEED
 from coupled.resources import shipped_rigs
 from coupled.rig.rigfile import read_rig
@@ -31,7 +31,7 @@ def test_rising_air_raises_the_angle_of_attack() -> None:
     flight = read_rig(shipped_rigs()["t37"]).flight
     assert flight is not None
     frame_s, up_m_per_s = 1 / 120, 2.0
-    gusts = Gusts(flight, frame_s, air_m_per_s=[up_m_per_s] * 4)
+    gusts = Gusts(flight, frame_s, air=GivenAir(up=[up_m_per_s] * 4))
     airframe = make_aircraft(flight, frame_s, gusts=gusts)
     before = airframe.motion()
     for _ in range(3):

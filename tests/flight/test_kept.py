@@ -14,6 +14,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from coupled.flight import putback
+from coupled.flight.addresses import neighbours
 from coupled.flight.airframe import JSBSimAirframe
 from coupled.flight.kept import PUT_BACK_EXACTLY, AircraftCache, CachedAircraft, in_trim
 from coupled.flight.loop import fly
@@ -25,6 +27,7 @@ CONTROLS = ("column", "wheel", "pedals")
 FLIGHTS = {
     "737": Flight(model="737", altitude=3000.0, calibrated_airspeed=130.0),
     "B747": Flight(model="B747", altitude=3000.0, calibrated_airspeed=150.0),
+    "c172p": Flight(model="c172p", altitude=1500.0, calibrated_airspeed=50.0),
     "T37": Flight(
         model="T37",
         altitude=1500.0,
@@ -134,22 +137,29 @@ def test_a_property_that_a_reset_leaves_changed_is_detected(model: str) -> None:
         assert not cached.restarted()
 
 
-@pytest.mark.slow
-def test_why_a_c172p_is_not_kept() -> None:
-    """JSBSim's reset forgets where its stall has hysteresis, and no property shows that."""
-    flight = Flight(model="c172p", altitude=1500.0, calibrated_airspeed=50.0)
-
-    def c172p() -> JSBSimAirframe:
-        return JSBSimAirframe(flight, 1.0 / 120.0, CONTROLS)
-
-    cached = in_trim(c172p(), "any")
+def test_a_reset_keeps_the_limits_of_a_stall() -> None:
+    """JSBSim's own sets them to zero, and then a stall ends as it begins."""
+    cached = in_trim(made("c172p"), "any")
     assert isinstance(cached.airframe, JSBSimAirframe)
+    fresh = made("c172p")
     assert cached.restarted()
     stall(cached.airframe)
-    fresh = c172p()
     stall(fresh)
     reads = [each.reader("aero/stall-hyst-norm") for each in (fresh, cached.airframe)]
-    assert [read() for read in reads if read is not None] == [1.0, 0.0]
+    assert [read() for read in reads if read is not None] == [1.0, 1.0]
+
+
+@pytest.mark.parametrize("values", [(0.36, 0.08), (0.0, 0.0)])  # at no place, and at several
+def test_an_aircraft_whose_stall_s_limits_are_not_found_is_not_kept(
+    values: tuple[float, float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(putback, "neighbours", lambda found, _: neighbours(found, values))
+    assert in_trim(made("c172p"), "any").kind is None
+
+
+def test_an_object_that_is_no_aerodynamics_has_no_limits() -> None:
+    assert neighbours(object(), (0.36, 0.09)) is None
+    assert neighbours(made("c172p")._fdm.get_propulsion(), (0.36, 0.09)) is None
 
 
 def short(run: str, force_N: float, changes: dict[str, Any] | None = None) -> Manoeuvre:
@@ -160,7 +170,9 @@ def short(run: str, force_N: float, changes: dict[str, Any] | None = None) -> Ma
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("run", ["pull-up-737", "pull-up-c172p"])
 def test_flights_from_the_cache_have_the_bytes_of_flights_without(
+    run: str,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     restarts, restarted = list[bool](), CachedAircraft.restarted
@@ -170,7 +182,7 @@ def test_flights_from_the_cache_have_the_bytes_of_flights_without(
         return restarts[-1]
 
     monkeypatch.setattr(CachedAircraft, "restarted", told)
-    flights = [short("pull-up-737", force_N) for force_N in (170.0, -90.0, 40.0)]
+    flights = [short(run, force_N) for force_N in (170.0, -90.0, 40.0)]
     alone = [fly(flight).data.tobytes() for flight in flights]
     cache = AircraftCache()
     together = [fly(flight, cache=cache).data.tobytes() for flight in (*flights, *flights[::-1])]
@@ -181,7 +193,7 @@ def test_flights_from_the_cache_have_the_bytes_of_flights_without(
 @pytest.mark.parametrize(
     ("run", "changes"),
     [
-        ("pull-up-c172p", None),
+        ("awjsra-shear", None),
         ("pull-up-737", {"flight.mass": 1.1}),
         ("pull-up-737", {"flight.gust_rms_m_per_s": 1.0}),
         ("pull-up-737", {"flight.pitch_damping": 0.9}),

@@ -8,6 +8,8 @@ from pathlib import Path, PurePosixPath
 import numpy as np
 import pytest
 
+from coupled import Step, load_rig
+from coupled import fly as fly_rig
 from coupled.errors import InputError
 from coupled.exporting.alone import fly_alone
 from coupled.exporting.write import Flown, export, put
@@ -67,6 +69,9 @@ def test_a_folder_without_the_model_is_named(folder: Path) -> None:
     (folder / "mine.toml").write_text(text.replace('"models"', '"elsewhere"'))
     with pytest.raises(InputError, match=r"mine.toml: flight.model_folder: 'elsewhere' holds no"):
         read_rig(folder / "mine.toml")
+    lost = load_rig("t37").changed({"flight.model_folder": "elsewhere"})
+    with pytest.raises(InputError, match=r"model_folder: 'elsewhere' holds no T37/T37.xml"):
+        fly_rig(lost, column=Step(force_N=5.0), duration_s=0.1)
 
 
 def test_a_variant_of_another_file_name_flies_and_is_exported_alone(folder: Path) -> None:

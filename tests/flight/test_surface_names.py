@@ -105,7 +105,8 @@ def test_a_stabilator_by_other_names_flies_as_the_elevator(tmp_path: Path) -> No
     assert b"<output>fcs/stabilator-cmd-norm</output>" in system
     rig.save(tmp_path / "saved.toml")
     assert read_rig(tmp_path / "saved.toml") == rig
-    with pytest.raises(InputError, match="does not move its elevator at once"):
+    says = r"does not move its elevator at once; .*controls\.column\.surface_property and command_"
+    with pytest.raises(InputError, match=says):
         flown(rig.changed({"controls.column.command_property": []}))
 
 
@@ -159,7 +160,7 @@ READS = """
 
 def test_properties_of_flightgear_are_listed_and_made_from_the_rig(tmp_path: Path) -> None:
     rig = t37(flight__model_folder=str(own_t37(tmp_path, lambda t: within_controls(t, READS, ""))))
-    names = "/controls/flight/spoilers, systems/electrical/volts; give each a value here"
+    names = "/controls/flight/spoilers, systems/electrical/volts; give each a value in fl"
     with pytest.raises(InputError, match=rf"flight\.properties: T37 reads .* does: {names}"):
         flown(rig)
     one = rig.changed({"flight.properties": {"systems/electrical/volts": 28.0}})
@@ -178,6 +179,19 @@ LATE = """<channel name="late"><actuator name="fcs/late"><input>fcs/elevator-cmd
     <delay>0.2</delay><output>fcs/late-cmd-norm</output></actuator></channel>"""
 
 
+@pytest.mark.parametrize("own", [False, True])
+@pytest.mark.parametrize("part", ["fcs/flap", "gear/gear"])
+def test_a_property_that_the_model_sets_itself_is_refused(
+    tmp_path: Path, own: bool, part: str
+) -> None:
+    """Else the flight would have its flaps up, say, against the rig file."""
+    folder = str(own_t37(tmp_path, lambda text: text)) if own else ""
+    rig = t37(flight__model_folder=folder)
+    says = f"{part}-pos-norm: T37 sets it itself, to [01] in trim; leave it out, or give {part}-cmd"
+    with pytest.raises(InputError, match=says):
+        flown(rig.changed({"flight.properties": {f"{part}-pos-norm": 0.5}}))
+
+
 def test_an_actuator_with_a_delay_moves_its_surface_late(tmp_path: Path) -> None:
     def late(text: str) -> str:
         read = "<input>fcs/elevator-cmd-norm</input>"
@@ -186,7 +200,7 @@ def test_an_actuator_with_a_delay_moves_its_surface_late(tmp_path: Path) -> None
 
     folder = str(own_t37(tmp_path, late))
     rig = t37(flight__model_folder=folder)
-    with pytest.raises(InputError, match="does not move its elevator at once"):
+    with pytest.raises(InputError, match=r"at once; .* moves it, give direct_controls = false"):
         flown(rig)
     found = flown(rig.changed({"flight.direct_controls": False}))["elevator_rad"]
     wanted = flown(t37())["elevator_rad"]

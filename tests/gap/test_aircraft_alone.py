@@ -14,6 +14,7 @@ from coupled.errors import InputError
 from coupled.gap.checks import trimmed
 from coupled.gap.diagnose import diagnose
 from coupled.gap.findings.diagnosis import Diagnosis
+from coupled.gap.findings.flown import fly_force
 from coupled.gap.stages.airframe import airframe_outputs
 from coupled.gap.stages.alone import at_rate_of, motion_alone
 from coupled.record.importing.convert import import_log
@@ -21,6 +22,7 @@ from coupled.record.record import Record
 from coupled.resources import shipped_rigs
 from coupled.rig.rig import Rig
 from coupled.rig.rigfile import read_rig
+from tests.support.airframes import motion_of, noisy, pulses
 from tests.support.commands import coupled
 from tests.support.ownlogs import flightgear_log, flown
 from tests.support.rigs import bench
@@ -168,3 +170,15 @@ def test_a_log_that_was_imported_beside_a_rig_is_trimmed_as_it_begins(tmp_path: 
     rig, said = trimmed(at_rate_of(alone(), known), {"log": known})
     assert rig.flight is not None and rig.flight.calibrated_airspeed == pytest.approx(52.0, abs=1.0)
     assert "the first rows of log" in said
+
+
+def test_a_rudder_that_a_yaw_damper_moves_is_led_to_where_it_was_measured() -> None:
+    """Without the pedals' command: the model's damper alone left 228 floors in the roll rate."""
+    jet = read_rig(shipped_rigs()["737"])
+    record = fly_force(noisy(jet), {"pedals": pulses(jet, 16.0)["pedals"]}, seed=3)
+    motion = motion_of(record)
+    assert float(np.ptp(motion["rudder_rad"])) > 0.02
+    outputs = airframe_outputs(jet, motion)
+    assert {"roll_rate_rad_per_s", "yaw_rate_rad_per_s"} <= {one.channel for one in outputs}
+    assert "rudder_rad" not in {one.channel for one in outputs}
+    assert all(one.gap(jet) < one.limit for one in outputs)

@@ -184,9 +184,12 @@ def test_the_effects_of_two_parts_are_those_of_each_alone() -> None:
     for name, true in WORN.items():
         assert found.improved[name] == pytest.approx(true, rel=0.02)
     alone = diagnose(cessna(), {"r": short(*WORN.items())}, "wheel")
-    values = {effect.name: effect.value for effect in alone.effects}
+    sizes = {effect.name: effect.parameters[0] for effect in alone.effects}
     for effect in found.effects:
-        assert effect.value == pytest.approx(values[effect.name], rel=1e-6)
+        # A fit ends where a step would gain less than the data can show: far within its interval.
+        size = sizes[effect.name]
+        assert size.low is not None and size.high is not None
+        assert effect.value == pytest.approx(size.value, abs=0.01 * (size.high - size.low))
     for stage in ("linkage", "surface", "airframe"):
         name = stage if stage == "airframe" else f"wheel.{stage}"
         assert found.stage(name).gap == pytest.approx(alone.stage(stage).gap, rel=1e-6)

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from coupled.gap.diagnose import diagnose
-from tests.support.machines import axis, axis_rig
+from coupled.gap.findings.flown import Again, closed_loop
+from coupled.record.record import Record
+from coupled.rig.rig import Rig
+from tests.support.machines import axis, axis_rig, sprung, sprung_rig
 
 
 @pytest.mark.slow
@@ -26,3 +30,17 @@ def test_its_friction_is_found_where_none_is_filed() -> None:
     stiffness = next(p for p in effect.parameters if p.name == "stiffness_N_per_m")
     assert stiffness.low is not None and stiffness.high is not None
     assert stiffness.low < 1e6 < stiffness.high
+
+
+def test_a_bench_is_flown_again_only_if_a_spring_holds_it() -> None:
+    """Without a spring any error of the force makes the motion drift."""
+
+    def flown(rig: Rig, record: Record) -> bool:
+        level = np.zeros(len(record))
+        channels = (*record.channels, "dynamic_pressure_Pa")
+        known = Record(channels, np.column_stack((record.data, level)))
+        again = Again.of(rig, ["column"], known)
+        return closed_loop(rig, rig, ["column"], again) is not None
+
+    assert not flown(axis_rig(), axis(seconds=6.0))
+    assert flown(sprung_rig(), sprung(np.zeros_like, seconds=6.0))

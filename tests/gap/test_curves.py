@@ -8,21 +8,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from coupled.authority.held import true_deflection
 from coupled.blind.twin.twin import Twin
 from coupled.gap.chain import Part
 from coupled.gap.diagnose import findings
-from coupled.gap.findings.curvefit import Basis, choose, closed_form
-from coupled.gap.findings.curvelaws import LAWS
+from coupled.gap.findings.curvefit import LAWS, Basis, choose, closed_form
 from coupled.gap.findings.curves import response_to_force
 from coupled.gap.findings.diagnosis import PartDiagnosis
 from coupled.gap.noise.smooth import smoothed
 from coupled.gap.prepare import prepare
 from coupled.gap.search.beam import search_sets
+from coupled.gap.search.problem import ModelError
 from coupled.gap.signals.output import Output
 from coupled.gap.signals.reading import Sensed
 from coupled.plots.curves import draw_curves
 from coupled.plots.gapview import View
-from coupled.record.record import write_record
+from coupled.record.record import Record, write_record
 from coupled.rig.rigfile import read_rig
 from coupled.tables.gaps import curve_table
 from tests.support.commands import coupled
@@ -74,7 +75,7 @@ def healthy(twin: Twin, time_s: float, pressure_Pa: float) -> None:
 
 
 def test_damping_by_the_square_of_the_speed_is_a_curve_over_the_rate() -> None:
-    found = curves_of(recorded(by_the_square))
+    found = curves_of(recorded(by_the_square, seconds=12.0))
     assert found is not None
     (curve,) = found.found
     assert (curve.stage, curve.of, curve.unit) == ("loader", "rate_m_per_s", "N")
@@ -91,16 +92,18 @@ def test_damping_by_the_square_of_the_speed_is_a_curve_over_the_rate() -> None:
 
 
 @pytest.mark.parametrize(
-    ("fault", "key", "like"),
+    ("fault", "bend", "key", "like"),
     [
-        (reads_by_the_square, "sensing.grip_curve", "c·δ²"),
-        (bends_unlike, "loader.bend_curve", "c·|F|"),
+        (reads_by_the_square, 9e-5, "sensing.grip_curve", "c·δ²"),
+        (bends_unlike, 9e-5, "loader.bend_curve", "c·|F|"),
+        # Of a rigid structure no bend falls with the force, but a reading may.
+        (bends_unlike, 0.0, "sensing.grip_load_curve", "c·|F|"),
     ],
 )
 def test_a_law_of_the_linkage_is_a_curve_over_its_own_signal(
-    fault: Fault, key: str, like: str
+    fault: Fault, bend: float, key: str, like: str
 ) -> None:
-    rig = RIG.changed({"controls.column.loader.bend_m_per_N": 9e-5})
+    rig = RIG.changed({"controls.column.loader.bend_m_per_N": bend})
     found = curves_of(recorded(fault, rig=rig), rig)
     assert found is not None
     (curve,) = found.found
@@ -173,8 +176,18 @@ def test_a_reading_is_inverted_along_its_curve(first: float) -> None:
         RIG.changed({f"controls.column.sensing.{key}": value for key, value in changes.items()}),
         "column",
     )
-    assert at_grip.at_grip(true) == pytest.approx(sensed.along_curve(true) + 0.01)
-    assert at_grip.from_grip(at_grip.at_grip(true)) == pytest.approx(true, abs=1e-7)
+    force, by_force = 100.0 * true, {"force_N": [0.0, 1.0], "reading_m": [0.0, -2e-3]}
+    loaded = Sensed(
+        at_grip.rig.changed({"controls.column.sensing.grip_load_curve": by_force}), "column"
+    )
+    assert at_grip.at_grip(true, force) == pytest.approx(sensed.along_curve(true) + 0.01)
+    assert loaded.at_grip(true, force) == pytest.approx(at_grip.at_grip(true, force) - 0.2 * true)
+    for one in (at_grip, loaded):
+        read = one.at_grip(true, force)
+        assert one.from_grip(read, force) == pytest.approx(true, abs=1e-7)
+        names = ("column_deflection_m", "column_force_N")
+        record = Record(names, np.column_stack((read, force)))
+        assert true_deflection(one.rig, "column", record) == pytest.approx(true, abs=1e-7)
 
 
 def test_curves_are_written_to_an_improved_rig_only(tmp_path: Path) -> None:
@@ -233,7 +246,7 @@ def test_a_closed_form_of_two_signals_is_named_if_it_fits_best(two: bool) -> Non
     product = place * np.abs(rate)
     wanted = 20.0 * (product if two else place**3) + rng.standard_normal(2400)
     output = Output("loader", "column_computed_m", wanted, lambda rig: 0.0 * wanted, 1.0, 100.0)
-    basis = Basis(law, places, [output], [hats], [wanted], np.ones(1))
+    basis = Basis(law, places, [output], [hats], [wanted], ModelError(np.zeros(1), np.ones(1)))
     pick = choose(basis, basis.sums("all"), ())
     other = {"c·δ·|v|": [product]}
     assert closed_form(basis, pick, (), other) == ("c·δ·|v|" if two else "c·δ³")

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from coupled.display import System
 from coupled.gap.chain import Part
 from coupled.gap.diagnose import diagnose
-from coupled.gap.effects.effect import Effect, apply
+from coupled.gap.effects.effect import BY_REGRESSOR, Effect, apply, keys_of
 from coupled.gap.effects.library import BY_NAME, EFFECTS
 from coupled.gap.findings.budget import ChannelShrink, Shrink
 from coupled.gap.findings.diagnosis import PartDiagnosis
@@ -127,7 +127,8 @@ def labels(figure: Figure) -> list[str]:
 
 @pytest.mark.parametrize(
     "effect",
-    [e for e in EFFECTS if e.name != "gravity"],  # acts on a wheel: test_gravity draws it
+    # Drawn where a rig has them: test_gravity (a wheel), test_regressor (a channel in the file).
+    [e for e in EFFECTS if e.name != "gravity" and not keys_of([e]) & {*BY_REGRESSOR}],
     ids=lambda effect: effect.name,
 )
 def test_every_effect_has_a_signature_with_units(

@@ -16,6 +16,7 @@ from coupled.gap.search.intervals import cut, half_width, open_above
 from coupled.gap.thresholds import LEAST_MEMORIES
 
 FRAMES = 2400
+NONE = np.zeros((0, FRAMES))  # samples of the input's error
 
 
 @pytest.mark.parametrize("spread", [0.05, 0.3])
@@ -26,11 +27,25 @@ def test_an_interval_counts_what_is_known_of_a_setting(spread: float) -> None:
     same = np.ones((FRAMES, 2))
     found = End(np.zeros(2), 0.0, left - left.mean(), same, None)
     groups = np.arange(FRAMES) // 300
-    half = half_width(found, 1, groups, np.array([0.0, 1.0 / spread**2]))
+    half = half_width(found, 1, groups, np.array([0.0, 1.0 / spread**2]), NONE)
     wanted = student.ppf(0.975, 6) * np.hypot(spread, 1.0 / np.sqrt(FRAMES))
     assert half[0] == pytest.approx(wanted, rel=0.15)
-    alone = half_width(replace(found, fun=left, jac=same[:, :1]), 1, groups, np.zeros(1))
+    alone = half_width(replace(found, fun=left, jac=same[:, :1]), 1, groups, np.zeros(1), NONE)
     assert alone[0] < half[0]
+
+
+def test_an_error_of_the_input_that_lasts_widens_an_interval_as_it_moves_the_estimate() -> None:
+    """Three samples e of an error along J move the estimate by their sizes: Student's t."""
+    rng = np.random.default_rng(5)
+    shape, sizes = np.sin(np.arange(FRAMES) / 40.0)[:, None], np.array([0.3, -0.2, 0.1])
+    noise = rng.normal(size=FRAMES)
+    found = End(np.zeros(1), 0.0, noise, shape, None)
+    given_error = np.outer(sizes, shape[:, 0]) + rng.normal(size=(3, FRAMES))
+    groups = np.arange(FRAMES) // 300
+    half = half_width(found, 1, groups, np.zeros(1), given_error)
+    assert half_width(found, 1, groups, np.zeros(1), NONE)[0] < 0.15
+    wanted = student.ppf(0.975, 3) * np.sqrt(np.mean(sizes**2))
+    assert half[0] == pytest.approx(wanted, rel=0.15)
 
 
 @given(
@@ -68,7 +83,7 @@ def test_intervals_of_a_short_record_hold_and_say_something(numbers: int) -> Non
         noise = rng.normal(size=len(groups))
         found = np.asarray(np.linalg.lstsq(shapes, noise, rcond=None)[0], np.float64)
         end = End(found, 0.0, noise - shapes @ found, shapes, None)
-        half = half_width(end, 1, groups, np.zeros(numbers))
+        half = half_width(end, 1, groups, np.zeros(numbers), NONE)
         held += abs(found[0]) < half[0]
         widths.append(half[0] * np.sqrt(len(groups)))
     assert held >= 184  # of 190 on the mean

@@ -27,14 +27,17 @@ PACKAGE = ROOT / "coupled"
 # Modules of `gap/effects` that hold entries, where an effect's name is spelled.
 ENTRIES = ("library", "airframe", "loader", "linkage", "sensing", "frictions")
 # Effects of machines of others, which are none of the contract's.
-IN_NO_TRIAL = {*WITHOUT_TWIN, "servo_delay", "servo_tuning", "servo_acceleration_limit"}
+IN_NO_TRIAL = {
+    *WITHOUT_TWIN,
+    *("servo_delay", "servo_tuning", "servo_acceleration_limit"),
+}
 OF_A_WHEEL, WHEEL = {"gravity"}, CONTROL_NAMES[1]
 TWIN_OF = {kind.name: kind for kind in (*TWINS, *REVISION_2)}
 
 
 @pytest.fixture(scope="module")
 def flown() -> Rig:
-    return nominal_rig(True)
+    return nominal_rig(True).changed({"controls.column.loader.regressor": "motor_K"})
 
 
 @pytest.mark.parametrize("effect", EFFECTS, ids=lambda effect: effect.name)

@@ -44,10 +44,10 @@ def test_none_is_tried_where_the_lowest_is_never_met() -> None:
 
 
 def test_limits_are_those_that_are_nothing_else() -> None:
-    """What also bends or yields has a size beside its limit, and is screened by that."""
+    """What also bends has a size beside its limit, and is screened by that."""
     names = {effect.name for effect in EFFECTS if is_limit(effect)}
     servo = {"servo_rate_limit", "servo_acceleration_limit"}
-    assert names == {"force_limit", "surface_rate_limit"} | servo
+    assert names == {"force_limit", "surface_rate_limit", "yielding_contact"} | servo
 
 
 @pytest.mark.parametrize("share", [0.95, 0.88])

@@ -51,8 +51,8 @@ def cessna() -> Rig:
 
 @pytest.fixture(scope="module")
 def worn(cessna: Rig, tmp_path_factory: pytest.TempPathFactory) -> Record:
-    """A record of 30 s of a c172p whose C_lp is 0.702 of the model's, by its XML."""
-    return flown(tmp_path_factory.mktemp("models"), cessna, CLP, 0.702, 30.0)
+    """A record of 14 s of a c172p whose C_lp is 0.702 of the model's, by its XML."""
+    return flown(tmp_path_factory.mktemp("models"), cessna, CLP, 0.702, 14.0)
 
 
 def searched(rig: Rig, record: Record, library: Sequence[Effect]) -> Choice:
@@ -189,7 +189,7 @@ def test_effects_of_lateral_motion_are_tried_where_it_moves(cessna: Rig, worn: R
         return {effect.name for effect in tried_effects(every, readers, [output])}
 
     lateral = {effect.name for effect in AIRFRAME if effect.needs} - {"vertical_gust"}
-    assert len(lateral) == 10
+    assert len(lateral) == 11
     assert tried(motion) - tried(still) == {*lateral, f"term {CLP}"}
 
 
@@ -256,7 +256,10 @@ def test_the_whole_diagnosis_names_it_alone_and_its_rig_closes_the_gap(
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [effect.name for effect in AIRFRAME if "gust" not in effect.name])
 def test_each_factor_is_named_at_its_size(cessna: Rig, name: str) -> None:
-    """By surfaces and motion alone, within 3 standard errors: 14 sizes are tested."""
+    """By surfaces and motion alone, within 3 standard errors: 14 sizes are tested.
+
+    Of three samples of the propagated error, an interval is 1.6 times as wide as of many.
+    """
     effect = BY_NAME[name]
     key = effect.value_key(effect.free[0])
     value = SIZES.get(name, 0.8)
@@ -266,4 +269,4 @@ def test_each_factor_is_named_at_its_size(cessna: Rig, name: str) -> None:
     (step,) = found.steps
     assert step.effect.name == name and not step.rivals
     error = (found.fit.high[key] - found.fit.low[key]) / (2.0 * 1.96)
-    assert abs(found.fit.values[key] - value) < 3.0 * error < 0.03
+    assert abs(found.fit.values[key] - value) < 3.0 * error < 0.05

@@ -162,6 +162,8 @@ def test_a_rig_file_keeps_its_comments_and_order() -> None:
     assert new.startswith('# said\n# of it\n# mine\nname = "a"  # a name\n')
     assert "x = 3.0 # of x\ny = 2.0\n" in new
     assert '[b.t]\n"loader.m" = 0.5\n' in new
+    between = edited("[a]\nx = 1\n\n[c]\ny = 2\n", {("a", "t", "m"): 0.5})
+    assert between == "[a]\nx = 1\n\n[a.t]\nm = 0.5\n\n[c]\ny = 2\n"
     rig = slide()
     other = rig.changed({"controls.column.loader.mass_kg": 11.0, "noise": {"column_force_N": 0.1}})
     assert differences(rig, other) == {

@@ -144,7 +144,7 @@ def test_what_gained_is_listed_where_nothing_else_did(beside: bool) -> None:
     problem = Problem(Case(bench(), "column", [output(predict(real) + NOISE, predict)]))
     root, fitted = problem.fit(()), problem.fit((OFFSET,))
     wide = replace(fitted, low={**fitted.low, OFFSET.value_key(OFFSET.free[0]): -1.0})
-    beam = Beam(problem, root, problem.variances(root.rig))
+    beam = Beam(problem, root, problem.model_error(root.rig))
     for one in (root, wide):
         beam.add(one)
     beam.recount()
@@ -273,7 +273,8 @@ def test_of_laws_that_contain_one_another_the_one_that_is_there_is_named(
     name: str, values: dict[str, float]
 ) -> None:
     case = stage_of_record("linkage", name, tuple(values.items()), 31)
-    library = [effect for effect in EFFECTS if effect.stage == "linkage"]
+    # Where F drives the machine, a contact that yields is a bend, and is not tried (`prepare`).
+    library = [e for e in EFFECTS if e.stage == "linkage" and e.name != "yielding_contact"]
     assert names(search_sets(case, library)[1]) == {name}
 
 

@@ -124,6 +124,17 @@ def test_a_record_without_a_state_says_what_is_not_judged(
     assert prepare(rig, {"r": record}, Part("column")).left_out == (said,)
 
 
+def test_a_throttle_that_moves_leaves_drag_and_thrust_unjudged(rig: Rig, healthy: Record) -> None:
+    """The model's throttle stays as in trim; the rates hardly depend on it."""
+    for moved, judged in ((0.0, set(SLOW)), (0.2, set())):
+        throttle = 0.5 + moved * (healthy.time_s > 5.0)
+        names = (*healthy.channels, "fcs/throttle-cmd-norm[0]")
+        record = Record(names, np.column_stack((healthy.data, throttle)), healthy.manifest)
+        assert set(slow(airframe_outputs(rig, record))) == judged
+        (said,) = prepare(rig, {"r": record}, Part("column")).left_out or ("",)
+        assert ("drag and thrust, cannot be judged" in said) == (moved > 0.0)
+
+
 def test_a_complete_record_says_nothing_of_the_kind(rig: Rig, healthy: Record) -> None:
     assert prepare(rig, {"r": healthy}, Part("column")).left_out == ()
 

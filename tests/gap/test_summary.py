@@ -14,7 +14,7 @@ from coupled.gap.findings.result import (
     StageResult,
     Verdict,
 )
-from coupled.gap.findings.summary import closes, in_time, summary
+from coupled.gap.findings.summary import changed, closes, in_time, summary
 from coupled.gap.search.course import Bounds, Course
 
 FRICTION = EffectResult(
@@ -133,3 +133,22 @@ def test_a_rate_is_checked_before_it_is_said(rate: tuple[float, float, float], w
     text = in_time(replace(FRICTION, parameters=(factor,), course=course))
     assert words in text
     assert bool(text) is bool(words)
+
+
+@pytest.mark.parametrize("control", [None, "column"])
+def test_a_change_is_that_of_the_rig_written(control: str | None) -> None:
+    """With curves the certain effects are fitted again: friction was 15 N, then 10.85, now 18."""
+    head = "controls.column." if control else ""
+    friction = ParameterEstimate(
+        "friction_N", 10.85, 5.0, 16.0, "loader.friction_N", "N", 15.0, 10.85
+    )
+    damping = ParameterEstimate(
+        "factor", 1.5, 1.1, 1.9, "loader.damping_N_s_per_m", "N·s/m", 120.0, 180.0, relative=True
+    )
+    found = [EffectResult("friction", "loader", 0.89, (friction, damping), control=control)]
+    again = {("controls", "column", "loader", "friction_N"): 18.0, ("frame_rate_Hz",): 60.0}
+    assert changed(found, {}) == [
+        f"{head}loader.friction_N 15 → 10.85 N (-4.15)",
+        f"{head}loader.damping_N_s_per_m 120 → 180 N·s/m (+50 %)",
+    ]
+    assert changed(found, again)[0] == f"{head}loader.friction_N 15 → 18 N (+3)"

@@ -11,12 +11,15 @@ import pytest
 
 from coupled.errors import InputError
 from coupled.flight.aircraft import make_aircraft
+from coupled.gap.effects.airframe import term
 from coupled.gap.effects.effect import apply
 from coupled.gap.effects.library import BY_NAME
+from coupled.gap.findings.flown import fly_force
 from coupled.gap.search.case import Case
+from coupled.gap.search.fit import fit_alone
 from coupled.gap.search.problem import Problem
-from coupled.gap.signals.output import Output, white
-from coupled.gap.stages.airframe import TRIM, airframe_outputs
+from coupled.gap.signals.output import TRIM, Output, white
+from coupled.gap.stages.airframe import airframe_outputs
 from coupled.gap.stages.openloop import Moved, about, command_of, fly_open_loop
 from coupled.gap.stages.shots import SLOW
 from coupled.gap.stages.surfaces import own_trim, surface_points
@@ -27,7 +30,7 @@ from coupled.resources import shipped_rigs
 from coupled.rig.rig import Rig
 from coupled.rig.rigfile import read_rig
 from tests.support import threecontrols
-from tests.support.airframes import noisy
+from tests.support.airframes import motion_of, noisy, pulses
 from tests.support.gaps import made, nominal_rig
 from tests.support.models import edited_model
 
@@ -56,12 +59,13 @@ def test_a_surface_moves_by_as_much_about_another_trim(trim: float, own: float) 
 
 
 @pytest.mark.parametrize(
-    ("own", "off"), [(0.102, 0.0), (0.098, 0.0), (0.11, 0.007), (0.09, -0.007)]
+    ("own", "off"),
+    [(0.102, 0.0), (0.097, 0.0), (0.1045, 0.003), (0.0955, -0.003), (0.106, 0.006), (0.09, -0.01)],
 )
 def test_a_trim_within_the_error_of_the_measured_one_is_that_of_the_record(
     own: float, off: float
 ) -> None:
-    """A surface is then flown where it was measured; else it moves by what is beyond the error."""
+    """A surface is then flown where it was measured; from twice the error, about its own trim."""
     measured = 0.1 + np.array([0.0, 0.03, -0.06, 0.02])
     surface = Moved("elevator_rad", measured, POINTS, 0.1, FILED, 0.003)
     held = command_of(np.array([own]), POINTS)[0]
@@ -79,6 +83,18 @@ def test_the_right_aircraft_meets_the_motion_and_attitude_of_another_trim(
     gaps = {out.channel: out.gap(right) for out in airframe_outputs(rig, record)}
     assert {"pitch_rate_rad_per_s", *SLOW} <= gaps.keys()
     assert max(gaps.values()) < 1.1
+
+
+@pytest.mark.parametrize("seed", [4, pytest.param(3, marks=pytest.mark.slow)])
+def test_a_term_that_moves_the_trim_is_fitted_within_its_interval(seed: int) -> None:
+    """A fit from afar once ended beside the record's trim, 0.025 off with an error of 0.011."""
+    filed, name = noisy(read_rig(shipped_rigs()["737"])), "aero/coefficient/CD0"
+    real = filed.changed({f"flight.terms.{name}": 0.7})
+    record = motion_of(fly_force(real, pulses(filed, 20.0), seed=seed))
+    fitted = fit_alone(filed, "column", airframe_outputs(filed, record), [term(name, "DRAG")])
+    ((key, value),) = fitted.values.items()
+    assert fitted.low[key] < 0.7 < fitted.high[key]
+    assert value == pytest.approx(0.7, abs=0.005)
 
 
 def test_the_right_aircraft_meets_the_lateral_motion_of_another_trim() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -15,7 +16,14 @@ from coupled.flight.manoeuvre import Manoeuvre
 from coupled.flight.pilot import Step
 from coupled.rig.rigfile import read_rig
 from coupled.surveying.draft import draft, kind_of
-from coupled.surveying.survey import Surveyed, chosen_model, chosen_models, known_models, survey
+from coupled.surveying.survey import (
+    Surveyed,
+    chosen_model,
+    chosen_models,
+    known_models,
+    survey,
+    surveyed,
+)
 from tests.support.commands import coupled, files
 
 MODELS = known_models()
@@ -53,10 +61,10 @@ def test_a_law_of_the_models_own_is_told_from_direct_controls() -> None:
     assert mixed.lacking[0].startswith("pedals: moves its rudder by more than the command")
 
 
-def fly_first_rig(found: Surveyed, folder: Path) -> None:
+def fly_first_rig(found: Surveyed, folder: Path, models: str = "") -> None:
     """Fly a pull on a drafted rig: it is read, it trims, the nose goes up, at both speeds."""
     file = folder / "first.toml"
-    file.write_text(draft(found, "first"), encoding="utf-8")
+    file.write_text(draft(found, "first", models), encoding="utf-8")
     for speed in (found.slowest, found.fastest):
         rig = read_rig(file, {"flight.calibrated_airspeed_m_per_s": speed})
         column = rig.controls["column"]
@@ -69,6 +77,33 @@ def fly_first_rig(found: Surveyed, folder: Path) -> None:
 
 def test_a_first_rig_flies(tmp_path: Path) -> None:
     fly_first_rig(survey(chosen_model("F80C"), speeds=True), tmp_path)
+
+
+TAILS = """
+  <channel name="tails">
+    <fcs_function name="fcs/left-stab-pos-deg"><function><product><value>57.29577951308232</value>
+      <property>fcs/stab-angle</property></product></function></fcs_function>
+    <fcs_function name="fcs/right-stab-pos-rad"><function>
+      <property>fcs/stab-angle</property></function></fcs_function>
+  </channel>
+</flight_control>"""
+
+
+def test_a_surface_of_other_names_is_found(tmp_path: Path) -> None:
+    """A stabilator of two halves, one in degrees; a tab that moves otherwise is none of them."""
+    shutil.copytree(MODELS["T37"] / "T37", tmp_path / "T37")
+    file = tmp_path / "T37" / "T37.xml"
+    text = file.read_text().replace("fcs/elevator-pos-rad", "fcs/stab-angle")
+    file.write_text(text.replace("</flight_control>", TAILS))
+    found = survey(chosen_model(str(file)))
+    assert found.controls == ("column", "wheel", "pedals") and found.direct
+    fly_first_rig(replace(found, slowest=80.0, fastest=120.0), tmp_path, ".")
+    text = (tmp_path / "first.toml").read_text()
+    assert 'surface_property = ["fcs/left-stab-pos-deg", "fcs/right-stab-pos-rad"]' in text
+    half = file.read_text().replace("<value>57.29577951308232</value>", "<value>30</value>")
+    file.write_text(half)
+    with pytest.raises(InputError, match=r"does not move its elevator within 1 s; .*surface_prop"):
+        surveyed("T37", chosen_model(str(file)))
 
 
 def test_every_guess_of_a_first_rig_is_listed_as_one(tmp_path: Path) -> None:

@@ -12,7 +12,14 @@ import polars as pl
 import pytest
 
 from coupled.errors import InputError
-from coupled.record.record import FORMAT, Record, manifest_path, read_record, write_record
+from coupled.record.record import (
+    FORMAT,
+    Record,
+    manifest_path,
+    read_record,
+    record_of,
+    write_record,
+)
 
 TIME = [0.0, 0.1, 0.2]
 RECORD = Record(("time_s", "a"), np.column_stack([TIME, [1.0, np.pi, 3.0]]), {"seed": 3})
@@ -77,3 +84,31 @@ def test_cells_may_have_spaces_about_their_numbers(tmp_path: Path) -> None:
     np.testing.assert_array_equal(read_record(path)["a"], [1.5, -2.5, 3.5])
     path.write_text("time_s,a,b\n0.0,1.5,2\n0.1,  ,3\n0.2,3.5,4\n", encoding="utf-8")
     np.testing.assert_array_equal(read_record(path)["a"], [1.5, np.nan, 3.5])  # a gap
+
+
+@pytest.mark.parametrize(
+    ("wrong", "right"),
+    [
+        ("wheel_comptued_rad", "wheel_computed_rad"),  # two letters exchanged
+        ("wheel_computed_deg", "wheel_computed_rad"),  # another unit
+        ("Wheel_Force_n", "wheel_force_N"),  # upper and lower case
+        ("wheel_force", "wheel_force_N"),  # no unit
+        ("roll_rate_deg_per_s", "roll_rate_rad_per_s"),
+        ("dynamic_pressure_psf", "dynamic_pressure_Pa"),
+    ],
+)
+def test_a_mistyped_channel_is_refused_with_its_name(wrong: str, right: str) -> None:
+    columns = {"time_s": np.array([0.0, 0.1]), wrong: np.array([1.0, 2.0])}
+    with pytest.raises(InputError, match=f"{wrong}.*rename it to {right}"):
+        record_of(columns, "record.csv")
+
+
+@pytest.mark.parametrize("own", ["room_C", "wheel_force_reserve", "pitch_trim_norm", "note"])
+def test_a_channel_of_the_users_own_is_kept(own: str) -> None:
+    columns = {"time_s": np.array([0.0, 0.1]), own: np.array([1.0, 2.0])}
+    assert own in record_of(columns, "record.csv")
+
+
+def test_a_second_sensor_beside_the_first_is_kept() -> None:
+    names = ("time_s", "wheel_force_N", "wheel_force_2_N")
+    assert record_of(dict.fromkeys(names, np.array([0.0, 0.1])), "record.csv").channels == names

@@ -20,10 +20,12 @@ from coupled.flight.airframe import JSBSimAirframe
 from coupled.flight.loop import fly
 from coupled.flight.runfile import read_run
 from coupled.record.record import Record
+from coupled.rig.hosted import Feel
+from coupled.rig.nodes import on_nodes
 from coupled.rig.replay import (
+    drive_loader,
     replay_compensation,
     replay_linkage,
-    replay_loader,
     replay_schedule,
     replay_surface,
 )
@@ -85,7 +87,7 @@ def test_the_loader_reproduces_the_record_to_its_noise(case: Case) -> None:
     gradient, none = case["column_gradient_N_per_m"], np.zeros_like(computed)
 
     def stage(f: Floats) -> Floats:
-        return replay_loader(case.rig, "column", f, gradient, none)[0]
+        return drive_loader(case.rig, "column", on_nodes(case.rig, f), Feel(gradient), none)[0]
 
     floor = np.hypot(white(computed), carried(stage, force, white(force)))
     assert rms(computed - stage(force)) <= 1.1 * floor

@@ -21,6 +21,7 @@ from coupled.flight.manoeuvre import configure
 from coupled.rig.curves import BendCurve, CommandCurve, Curve, FrictionCurve
 from coupled.rig.declaration import Hand
 from coupled.rig.frame import step_frame
+from coupled.rig.hosted import Feel
 from coupled.rig.imposed import answer_to
 from coupled.rig.nodes import on_nodes
 from coupled.rig.packing import pack
@@ -151,6 +152,11 @@ EQUAL: dict[str, tuple[dict[str, Any], dict[str, Any], dict[str, Any]]] = {
         {f"{SENSING}.grip_curve": {"deflection_m": [-0.1, 0.2], "reading_m": [-0.098, 0.202]}},
         {},
     ),
+    "the reading at the grip by the force": (
+        {"bend_m_per_N": 3e-4},
+        {f"{SENSING}.grip_load_curve": line("force_N", "reading_m", 3e-4 - 9.136e-5, 60.0)},
+        {},
+    ),
     "the gauge's scale and zero": (
         {f"{SENSING}.force_scale": 1.07, f"{SENSING}.force_zero_N": 2.0},
         {f"{SENSING}.force_curve": {"force_N": [-60.0, 50.0], "reading_N": [-62.2, 55.5]}},
@@ -183,6 +189,7 @@ KINDS: dict[str, tuple[str, str, bool]] = {  # of each curve its lists, and whet
     f"{SENSING}.deflection_curve": ("deflection_m", "reading_m", True),
     f"{SENSING}.force_curve": ("force_N", "reading_N", True),
     f"{SENSING}.grip_curve": ("deflection_m", "reading_m", True),
+    f"{SENSING}.grip_load_curve": ("force_N", "reading_m", False),
     "controls.column.rigging.command_curve": ("deflection_norm", "command_norm", True),
 }
 RUBBING = {"friction_N": 2.0, "breakout_N": 3.0}
@@ -295,7 +302,7 @@ def test_an_imposed_motion_is_answered_with_damping_and_spring_of_curves() -> No
 
     def answered(changes: dict[str, Any]) -> Floats:
         rig = bench(changes)
-        return answer_to(rig, "column", on_nodes(rig, way), np.full(len(way), 560.0)).force
+        return answer_to(rig, "column", on_nodes(rig, way), Feel(np.full(len(way), 560.0))).force
 
     more = {
         "friction_curve": {"rate_m_per_s": [0.0, 0.2, 0.5], "force_N": [0.0, 2.0, 20.0]},

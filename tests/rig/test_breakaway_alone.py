@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from coupled import load_rig
+from coupled.rig.hosted import Feel
 from coupled.rig.nodes import on_nodes
 from coupled.rig.replay import drive_loader
 
@@ -18,7 +19,7 @@ def test_a_loader_with_breakaway_alone_moves_on_without_friction() -> None:
     gradient = np.full(len(time_s), 800.0)
     still = np.zeros(len(time_s))
     rigs = (plain.changed(keys), plain)
-    moved = [drive_loader(rig, "column", nodes, gradient, still)[0] for rig in rigs]
+    moved = [drive_loader(rig, "column", nodes, Feel(gradient), still)[0] for rig in rigs]
     with_it, without = moved
     assert np.all(np.isfinite(with_it))
     assert np.abs(with_it - without).max() < 0.4 / 800.0  # less than the breakaway would hold

@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from subprocess import PIPE
 
 import numpy as np
 import pytest
@@ -107,6 +108,42 @@ def start(cache: Path) -> list[str]:
 def test_a_second_start_loads_no_compiler_and_no_linear_algebra(tmp_path: Path) -> None:
     assert start(tmp_path)[:2] == ["False", "True"]
     assert start(tmp_path) == ["True", "True", "False", "False"]
+
+
+KERNEL = """
+from coupled.rig.compiled import entry
+
+@entry
+def twice(number):
+    return 2.0 * number
+"""
+TOGETHER = """
+import sys
+from kernel import twice
+print("ready", flush=True)
+sys.stdin.readline()
+print(twice(2.0), twice(1j), sum(twice.stats.cache_hits.values()))
+"""
+
+
+def test_processes_that_start_together_compile_a_kernel_once(tmp_path: Path) -> None:
+    (tmp_path / "kernel.py").write_text(KERNEL)
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), *sys.path])}
+    command = [sys.executable, "-c", TOGETHER]
+    started = [
+        subprocess.Popen(command, env=environment, stdin=PIPE, stdout=PIPE, text=True)
+        for _ in range(2)
+    ]
+    for each in started:
+        assert each.stdout is not None
+        assert each.stdout.readline() == "ready\n"
+    for each in started:
+        assert each.stdin is not None
+        each.stdin.write("\n")
+        each.stdin.flush()
+    said = [each.communicate(timeout=300)[0].split() for each in started]
+    assert all(words[:2] == ["4.0", "2j"] for words in said)
+    assert sum(int(words[2]) for words in said) == 2 * (len(started) - 1)
 
 
 @entry

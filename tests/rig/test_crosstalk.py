@@ -9,8 +9,10 @@ import pytest
 
 from coupled.rig.crossing import leaks
 from coupled.rig.frame import CHANNELS_PER_CONTROL, step_frame
+from coupled.rig.hosted import Feel
+from coupled.rig.nodes import on_nodes
 from coupled.rig.packing import pack
-from coupled.rig.replay import replay_loader
+from coupled.rig.replay import drive_loader
 from coupled.rig.rig import Rig
 from tests.support.joined import joined
 
@@ -58,9 +60,9 @@ def test_a_replay_has_the_crosstalk_of_the_flight() -> None:
     column, wheel = 60.0 * np.sin(5.0 * times), 40.0 * np.sin(7.0 * times)
     flown, _ = run(rig, column, wheel)
     at = slice(0, 120 * rig.substeps, rig.substeps)
-    gradient = flown[:, 4]
+    gradient = Feel(flown[:, 4])
     force = column[at] + SHARE * wheel[at]
-    made, _ = replay_loader(rig, "column", force, gradient, np.zeros(120))
+    made, _ = drive_loader(rig, "column", on_nodes(rig, force), gradient, np.zeros(120))
     np.testing.assert_allclose(made, flown[:, 1], rtol=0, atol=2e-8)
 
 

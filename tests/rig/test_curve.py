@@ -203,6 +203,12 @@ WRONG: list[tuple[dict[str, Any], str, str]] = [
     ({"force_N": [[5.0, 6.0, 7.0]]}, "force_N", "is 5 N at neutral, at 0 Pa; give 0 there"),
     ({"force_N": [[0.0, 30.0, 20.0]]}, "force_N", "falls between 0.05 and 0.1 m at 0 Pa"),
     ({"force_N": [[0.0, 10.0, 560.0]]}, "force_N", "K·G_T = 1 at 0 Pa between 0.05 and 0.1 m"),
+    ({"force_N": [[0.0, 600.0, 620.0]]}, "force_N", "K·G_T = 1.1 at 0 Pa between 0 and 0.05 m"),
+    (
+        {"dynamic_pressure_Pa": [0.0, 9.0], "force_N": [[0.0, 10.0, 20.0], [0.0, 10.0, 560.0]]},
+        "force_N",
+        "K·G_T = 1 at 9 Pa between 0.05 and 0.1 m",
+    ),
 ]
 
 
@@ -220,6 +226,17 @@ def test_a_wrong_curve_is_one_line(wrong: dict[str, Any], key: str, problem: str
         rig_from_table(table | {"controls": {"column": data}}, "test")
     assert refused.value.key == f"{SCHEDULE}.{key}"
     assert problem in refused.value.problem
+
+
+def test_the_guard_of_a_segment_is_the_hosts_bend_times_its_slope_below_one() -> None:
+    """K̂ = 2⁻¹³ m/N; 8192 N/m is refused, and a little less is not, however soft the structure."""
+    bends = {"bend_m_per_N": 4e-4, "controls.column.compensation.bend_m_per_N": 2.0**-13}
+    nodes = [0.0, 0.0625, 0.125]
+    below = curved(nodes, [[0.0, 511.9, 600.0]], bends)
+    assert below.controls["column"].schedule.curved
+    with pytest.raises(InputError, match="stiffer than the structure") as refused:
+        curved(nodes, [[0.0, 512.0, 600.0]], bends)
+    assert refused.value.key == f"{SCHEDULE}.force_N"
 
 
 def test_a_schedule_of_neither_kind_is_refused() -> None:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from coupled.errors import InputError
+from coupled.rig.hosted import Feel
 from coupled.rig.imposed import answer_to
 from coupled.rig.nodes import on_nodes
 from coupled.rig.replay import drive_loader
@@ -26,7 +27,7 @@ def test_a_link_swings_as_a_pendulum_and_the_steps_are_of_second_order() -> None
         rig = pendulum_rig({"loader_rate_Hz": rate_Hz})
         steps = np.arange(len(times) * rig.substeps + 1)
         nodes = 9.0 * np.sin(4.0 * steps / (frame_Hz * rig.substeps))
-        found = drive_loader(rig, "wheel", nodes, zeros, zeros)[0]
+        found = drive_loader(rig, "wheel", nodes, Feel(zeros), zeros)[0]
         off.append(float(np.max(np.abs(found - exact))))
     assert off[0] < 1e-4 * np.ptp(exact)
     assert np.log2(off[0] / off[1]) / 2.0 > 1.7
@@ -38,7 +39,7 @@ def test_at_rest_and_under_imposed_motion_the_force_is_that_of_the_weight() -> N
     np.testing.assert_allclose(line.force, WEIGHT_N * np.sin(at + ANGLE_rad), rtol=1e-12)
     rig = pendulum_rig({"controls.wheel.drive": "displacement"})
     place = np.cumsum(np.full(400, 2e-3))
-    answer = answer_to(rig, "wheel", on_nodes(rig, place), np.zeros(400)).force[50:-50]
+    answer = answer_to(rig, "wheel", on_nodes(rig, place), Feel(np.zeros(400))).force[50:-50]
     wanted = WEIGHT_N * np.sin(place[50:-50] + ANGLE_rad) + DAMPING * 2e-3 * rig.frame_rate
     np.testing.assert_allclose(answer, wanted, rtol=1e-3)
 
@@ -64,7 +65,6 @@ def test_logs_of_slow_and_of_fast_machines_are_replayed(frame_Hz: float) -> None
     rig, zeros = pendulum_rig({"frame_rate_Hz": frame_Hz}), np.zeros(len(times))
     assert rig.substeps == (1 if frame_Hz > 2000.0 else 80)
     steps = np.arange(len(times) * rig.substeps + 1)
-    found = drive_loader(
-        rig, "wheel", 9.0 * np.sin(4.0 * steps / (frame_Hz * rig.substeps)), zeros, zeros
-    )[0]
+    nodes = 9.0 * np.sin(4.0 * steps / (frame_Hz * rig.substeps))
+    found = drive_loader(rig, "wheel", nodes, Feel(zeros), zeros)[0]
     assert np.max(np.abs(found - swing(times))) < 1e-5

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coupled.rig.friction import running_friction
+from coupled.rig.hosted import Feel, OtherInputs
 from coupled.rig.packing import pack
 from coupled.rig.replay import drive_loader
 from tests.support.rigs import amounts, bench, push
@@ -47,7 +48,7 @@ def test_bob_weight_offset_and_cubic_stand_in_the_balance() -> None:
     nodes = np.full(frames * rig.substeps + 1, 40.0)
     load = np.full(frames, 2.5)
     flat = np.full(frames, K)
-    x, _ = drive_loader(rig, "column", nodes, flat, np.zeros(frames), load)
+    x, _ = drive_loader(rig, "column", nodes, Feel(flat), np.zeros(frames), OtherInputs(load))
     assert K * x[-1] + 4.0e4 * x[-1] ** 3 == pytest.approx(40.0 + 3.0 - 12.0 * 1.5, rel=1e-9)
 
 

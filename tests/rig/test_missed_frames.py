@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from coupled.rig.compensation import SEED, misses
-from coupled.rig.hosted import Hosted, held_over
+from coupled.rig.hosted import NO_INPUTS, Feel, Hosted, held_over
 from coupled.rig.packing import pack
 from coupled.rig.replay import (
     drive_loader,
@@ -77,11 +77,11 @@ def test_a_missed_frame_holds_what_the_host_puts_out(multiplier: str) -> None:
     np.testing.assert_allclose(found.gradient, made, rtol=1e-12)
     again = replay_compensation(rig, "column", found.computed, found.force, None, missed)
     np.testing.assert_allclose(found.estimate, again, rtol=0, atol=1e-15)
-    product = replay_product(rig, "column", found.computed, found.gradient, None, missed)
+    product = replay_product(rig, "column", found.computed, Feel(found.gradient), missed)
     np.testing.assert_allclose(found.modifying, product, rtol=0, atol=1e-9)
     nodes = 60.0 * np.sin(9.0 * nodes_of(rig, FRAMES))
     still = np.zeros(FRAMES)
-    driven = (nodes, found.gradient, still, None, None, None, Hosted(missed=missed))
+    driven = (nodes, Feel(found.gradient), still, NO_INPUTS, None, Hosted(missed=missed))
     moved, _ = drive_loader(rig, "column", *driven)
     np.testing.assert_allclose(moved, found.computed, rtol=0, atol=1e-12)
 

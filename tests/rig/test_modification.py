@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from coupled.flight.manoeuvre import configure
 from coupled.rig import equations, modification
 from coupled.rig.equations import bend_loss, uncompensated_loss
+from coupled.rig.hosted import Feel
 from coupled.rig.packing import pack
 from coupled.rig.replay import (
     drive_loader,
@@ -111,7 +112,7 @@ def test_under_that_break_the_grip_moves_by_the_bend_alone() -> None:
     for force, moves in ((0.999 * leaves, False), (1.001 * leaves, True)):
         nodes = np.full(frames * rig.substeps + 1, force)
         first, second = np.full(frames, 6130.0), np.full(frames, 3120.0)
-        x, _ = drive_loader(rig, "column", nodes, first, np.zeros(frames), None, second)
+        x, _ = drive_loader(rig, "column", nodes, Feel(first, second), np.zeros(frames))
         assert (x[-1] > 0.0) == moves
 
 
@@ -140,7 +141,8 @@ def test_f_mod_is_the_force_specified_less_that_of_the_loader(
     wanted = equations.specified_force(rig, "column", 0.0, deflection)
     computed = equations.computed_deflection(deflection, wanted, bend)
     deflection, wanted, computed = (a[computed > 1e-6] for a in (deflection, wanted, computed))
-    given = replay_product(rig, "column", computed, 0.0 * computed + first, 0.0 * computed + second)
+    feel = Feel(0.0 * computed + first, 0.0 * computed + second)
+    given = replay_product(rig, "column", computed, feel)
     available = breakout + equations.basic_force(1750.0, computed)
     assert given == pytest.approx(equations.added_force(wanted, available), rel=1e-9, abs=1e-7)
 
@@ -165,7 +167,7 @@ def test_a_force_is_made_by_the_scale_that_the_host_assumes_over_the_real_one() 
     key = "controls.column.sensing.modifying_scale"
     right, wrong = (
         replay_product(
-            bench({"breakout_N": 9.0, key: scale}), "column", computed, 0 * computed + G_STIFF
+            bench({"breakout_N": 9.0, key: scale}), "column", computed, Feel(0 * computed + G_STIFF)
         )
         for scale in (1.0, 1.25)
     )
@@ -191,7 +193,7 @@ def test_the_loader_holds_the_two_segment_force() -> None:
     for force in (30.0, 160.0, -200.0):
         nodes = np.full(frames * rig.substeps + 1, force)
         first, second = np.full(frames, G_STIFF), np.full(frames, 1000.0)
-        x, _ = drive_loader(rig, "column", nodes, first, np.zeros(frames), None, second)
+        x, _ = drive_loader(rig, "column", nodes, Feel(first, second), np.zeros(frames))
         line = static_line(rig, "column", 3000.0, x[-1:])
         assert line.force[0] == pytest.approx(force, rel=1e-6)
 
@@ -201,7 +203,7 @@ def test_a_digital_product_is_of_what_the_host_read() -> None:
     gradient, misread = np.full(300, G_STIFF), np.zeros(300)
     misread[100] = 1e-3
     nodes = np.zeros(299 * rig.substeps + 1)
-    x, product = drive_loader(rig, "column", nodes, gradient, misread)
+    x, product = drive_loader(rig, "column", nodes, Feel(gradient), misread)
     host = rig.controls["column"].compensation
     added = G_STIFF / (1.0 - host.bend * G_STIFF) - rig.controls["column"].loader.basic_gradient
     assert product[:101] == pytest.approx(added * misread[:101])

@@ -7,6 +7,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
+from coupled.rig.hosted import Feel
 from coupled.rig.packing import pack
 from coupled.rig.replay import drive_loader
 from coupled.rig.rig import Rig
@@ -24,7 +25,7 @@ def stepped(rig: Rig, seconds: float = 1.0) -> tuple[Floats, Floats]:
     frames = round(seconds * rig.frame_rate)
     nodes = np.full((frames - 1) * rig.substeps + 1, STEP_N)
     flat = np.full(frames, G_T)
-    return drive_loader(rig, "column", nodes, flat, np.zeros(frames))
+    return drive_loader(rig, "column", nodes, Feel(flat), np.zeros(frames))
 
 
 def exact(times_s: Floats) -> Floats:
@@ -59,7 +60,7 @@ def test_a_held_product_reaches_the_loader_exponentially() -> None:
     frames, read = round(0.4 * rig.frame_rate), 0.01
     still = np.zeros((frames - 1) * rig.substeps + 1)
     flat = np.full(frames, G_T)
-    moved, product = drive_loader(rig, "column", still, flat, np.full(frames, read))
+    moved, product = drive_loader(rig, "column", still, Feel(flat), np.full(frames, read))
     assert product == pytest.approx((G_T - G_B) * read, rel=1e-4)
     t = np.arange(frames) / rig.frame_rate
     twice = 0.5 * t**2 - LAG_s * t + LAG_s**2 * (1.0 - np.exp(-t / LAG_s))  # ∬(1 − e^(−t/τ))

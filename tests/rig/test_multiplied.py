@@ -25,6 +25,7 @@ from coupled.flight.pilot import Doublet, Step
 from coupled.record.record import Record
 from coupled.resources import shipped_rigs
 from coupled.rig.equations import felt_gradient, total_to_computed
+from coupled.rig.hosted import Feel
 from coupled.rig.modification import modifying_force, set_gradients
 from coupled.rig.nodes import on_nodes
 from coupled.rig.packing import pack
@@ -139,10 +140,10 @@ def test_a_replay_has_the_scale_where_the_flight_has_it(multiplier: Multiplier) 
     )
     read, gradient = record["column_computed_m"], record["column_gradient_N_per_m"]
     taken = read if multiplier == "digital" else read / (1.2 * 0.9)
-    product = replay_product(rig, "column", taken, gradient)
+    product = replay_product(rig, "column", taken, Feel(gradient))
     np.testing.assert_allclose(product, record["column_modifying_force_N"], atol=1e-9)
     nodes = on_nodes(rig, record["column_force_N"])
-    again, _ = drive_loader(rig, "column", nodes, gradient, np.zeros_like(read))
+    again, _ = drive_loader(rig, "column", nodes, Feel(gradient), np.zeros_like(read))
     np.testing.assert_allclose(1.2 * 0.9 * again, read, atol=2e-5)
 
 

@@ -23,6 +23,7 @@ ELSEWHERE = {"gains", "calibration", "tolerance", "guesses"}
 ELSEWHERE |= {"command_property", "surface_property"}  # of the airframe
 RECORDERS = {("sensing", "force_stamp")}  # tests/rig/test_recorder.py
 BY_ANOTHER = {("loader", "crosstalk")}  # tests/rig/test_crosstalk.py
+OF_RECORDS = {("loader", "regressor"), ("loader", "regressor_reference")}  # gap/test_regressor.py
 # Everything on, so that each number counts: two segments, converters, an arc.
 SCHEDULE, HOST, SENSING = (f"controls.column.{s}" for s in ("schedule", "compensation", "sensing"))
 RIG = bench(
@@ -62,6 +63,7 @@ RIG = bench(
         f"{SENSING}.deflection_curve": {"deflection_m": [0.0, 0.1], "reading_m": [0.0, 0.11]},
         f"{SENSING}.force_curve": {"force_N": [0.0, 60.0], "reading_N": [0.0, 61.0]},
         f"{SENSING}.grip_curve": {"deflection_m": [0.0, 0.1], "reading_m": [0.0, 0.12]},
+        f"{SENSING}.grip_load_curve": {"force_N": [0.0, 60.0], "reading_m": [0.0, -2e-3]},
         "controls.column.rigging.command_curve": {
             "deflection_norm": [0.0, 1.0],
             "command_norm": [0.0, 0.9],
@@ -69,7 +71,9 @@ RIG = bench(
     }
 )
 COLUMN = RIG.controls["column"]
-CURVE = {"deflection": [0.0, 0.1], "force": [[0.0, 9.0], [0.0, 20.0]]}  # in place of gradients
+# In place of None: a curve in place of gradients, and a channel.
+OF_NONE: dict[str, Any] = {"deflection": [0.0, 0.1], "force": [[0.0, 9.0], [0.0, 20.0]]}
+OF_NONE |= {"regressor": "motor_K"}
 
 
 def other(value: Any) -> Any:
@@ -106,7 +110,7 @@ def with_other(section: Section, path: tuple[str, ...]) -> Section:
     if rest:
         values[first] = with_other(values[first], tuple(rest))
     else:
-        values[first] = CURVE[first] if values[first] is None else other(values[first])
+        values[first] = OF_NONE[first] if values[first] is None else other(values[first])
     return type(section)(**values)
 
 
@@ -117,7 +121,7 @@ def test_every_number_of_a_control_reaches_a_stage(path: tuple[str, ...]) -> Non
     # Not through `changed` of the rig: what the physics refuses is packed all the same.
     rig = type(RIG)(**{**dict(RIG), "controls": {"column": changed}})
     assert (pack(rig).tobytes() == pack(RIG).tobytes()) == (
-        path[0] in ELSEWHERE or path in RECORDERS | BY_ANOTHER
+        path[0] in ELSEWHERE or path in RECORDERS | BY_ANOTHER | OF_RECORDS
     )
 
 

@@ -27,7 +27,7 @@ from coupled.gap.findings.result import FORMAT
 from coupled.gap.search.descent import WHOLE, Descent
 from coupled.gap.search.evidence import Evidence
 from coupled.gap.search.found import Fit
-from coupled.gap.search.problem import Problem
+from coupled.gap.search.problem import ModelError, Problem
 from coupled.gap.signals.output import stage_gaps, stage_limits
 from coupled.record.record import Record, read_record
 from coupled.rig.rig import Rig
@@ -114,10 +114,11 @@ def shared(known: Known, searched: bool) -> Iterator[None]:
         key = ("signatures", id(self.problem.case), effect, _key_of(current))
         return known.of(key, self.problem.case, lambda: plain_signatures(self, current, effect))
 
-    def log_evidence(problem: Problem, fitted: Fit, variance: Any) -> Evidence:
-        key = ("evidence", id(problem.case), id(fitted), variance.tobytes())
+    def log_evidence(problem: Problem, fitted: Fit, error: ModelError) -> Evidence:
+        terms = error.power.tobytes(), error.samples.tobytes()
+        key = ("evidence", id(problem.case), id(fitted), *terms)
         made: Evidence = known.of(
-            key, (problem.case, fitted), lambda: plain_evidence(problem, fitted, variance)
+            key, (problem.case, fitted), lambda: plain_evidence(problem, fitted, error)
         )
         return made
 

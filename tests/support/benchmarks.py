@@ -93,7 +93,22 @@ def frame_cost() -> str:
     one, three = (f"{min(x):.2f} to {max(x):.2f} times" for x in each)
     return (
         f"{FRAME} takes {one} as long as JSBSim's `run()`, with three controls {three}"
-        f" {under(names[3])}. The benchmarks allow {FRAME_BOUNDS[1]} and {FRAME_BOUNDS[3]}."
+        f" {under(names[3])}.{_frame_parts()}"
+    )
+
+
+def _frame_parts() -> str:
+    """Return where the time beyond `run()` goes, with one control."""
+    kept = kept_figures("frame parts, 1 control(s)")
+    part: dict[str, list[float]] = {}
+    for name, value in kept.items():
+        part.setdefault(name.rpartition(", ")[2].removesuffix("_us"), []).append(value)
+    if not part:
+        return ""
+    more = [rig + rest for rig, rest in zip(part["rig"], part["rest"], strict=True)]
+    return (
+        f" Of the {min(more):.1f} to {max(more):.1f} µs more with one control, the loader alone"
+        f" takes {max(part['rig']):.1f}; the rest appears only beside the aircraft."
     )
 
 

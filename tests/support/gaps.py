@@ -31,7 +31,7 @@ def starts_of(case: Case, effect: Effect) -> list[dict[str, float]]:
     """Return where the fits of an effect start beside the nuisance parameters alone."""
     problem = Problem(case)
     root, every = problem.fit(()), np.full(len(case.outputs), 1e6)
-    screen = Screen(problem, problem.variances(root.rig))
+    screen = Screen(problem, problem.model_error(root.rig))
     found = screen.best(root, [effect], Worth(0.0, every))
     return [start for one in found for start in one.starts]
 

@@ -155,13 +155,14 @@ def damper(
     offset_N: float = 0.0,
     noise: tuple[float, float] = (1.0, 2e-6),
     grip: bool = False,
+    stiffness: float = 1e7,
 ) -> Record:
     """Return a record of a damper on a bench that imposes its motion, with play in its joints.
 
-    The joints are a dead zone with a stiff elastic end, which the piston follows: Euler's steps at
-    20 kHz. `noise` is added to F in N and to the motion in m.
+    The joints are a dead zone with an elastic end of a `stiffness` in N/m, which the piston
+    follows: Euler's steps at 20 kHz. `noise` is added to F in N and to the motion in m.
     """
-    fine, stiffness, piston = 20_000.0, 1e7, 0.0
+    fine, piston = 20_000.0, 0.0
     steps = round(fine / rate_Hz)
     times = np.arange(round(seconds * fine)) / fine
     way = 0.02 * np.sin(2.0 * np.pi * 0.7 * times) + 0.008 * np.sin(2.0 * np.pi * 1.9 * times)

@@ -32,10 +32,10 @@ LEVEL_N = 60.0
 Fault = Callable[[Twin, float, float], None]  # of the twin, time in s and q̄ in Pa
 
 
-def recorded(fault: Fault, seed: int = 1, rig: Rig = RIG) -> Record:
+def recorded(fault: Fault, seed: int = 1, rig: Rig = RIG, seconds: float = SECONDS) -> Record:
     """Return a noisy bench record of the twin of a rig; the fault is set anew in each frame."""
     rng = np.random.default_rng(seed)
-    frames = round(SECONDS * rig.frame_rate)
+    frames = round(seconds * rig.frame_rate)
     shape, _ = pilot_shape(rng, frames, rig.frame_rate)
     nodes, pressures = pilot_force(rig, shape, LEVEL_N), bench_pressure(rng, rig, frames)
     sigma = np.array([NOISE[name][0] for name in RIG_CHANNELS])

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 from numpy.typing import NDArray
 
+from coupled.rig.hosted import Feel
 from coupled.rig.replay import drive_loader
 from coupled.rig.rig import Rig
 from coupled.rig.rigfile import change, rig_from_table
@@ -65,4 +66,4 @@ def push(rig: Rig, force: Any, seconds: float, gradient: float = 560.0) -> NDArr
     wanted = force(times) if callable(force) else force
     nodes = np.asarray(wanted, dtype=float) * np.ones_like(times)
     zeros = np.zeros(frames + 1)
-    return drive_loader(fine, "column", nodes, zeros + gradient, zeros)[0]
+    return drive_loader(fine, "column", nodes, Feel(zeros + gradient), zeros)[0]

@@ -12,6 +12,8 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from coupled.gap.findings.credibility import remainder
 from coupled.gap.search.found import Fit
 from coupled.gap.search.screen import Worth
@@ -37,14 +39,18 @@ def second(original: Original, first: Any, argument: Any, *args: Any, **options:
     return argument
 
 
+def third(original: Original, first: Any, other: Any, argument: Any, *args: Any) -> Any:
+    """Take the place of a method that selects of its second argument: return it whole."""
+    return argument
+
+
 def idle(original: Original, *args: Any, **options: Any) -> None:
     """Take the place of a rule that only adds fits to a beam."""
 
 
-def without_relief(original: Original, beam: Any, names: frozenset[str]) -> Worth:
+def without_relief(original: Original, beam: Any, fitted: Fit, share: float = 1.0) -> Worth:
     """Return the worth of a candidate, without the penalty that it may remove."""
-    behind = beam.log(beam.best) - beam.log(names) if names else 0.0
-    return Worth(PRIOR_EFFECT + behind, beam.counts)
+    return Worth(PRIOR_EFFECT + share * beam.behind(fitted), beam.counts)
 
 
 def first_only(original: Original, *args: Any, **options: Any) -> Any:
@@ -98,6 +104,11 @@ RULES = (
          "discrete effects are fitted without screening", "_search_by_depth"),
     Rule("relief", "search.beam:Beam.worth", without_relief,
          "screening deducts the nuisance parameters' penalty"),
+    Rule("best_first", "search.screen:Screen.still_worth", third,
+         "once the most promising candidate is fitted, others must still be worth a fit"),
+    Rule("smooth_error", "search.problem:ModelError.smooth",
+         lambda original, error, noise: np.ones_like(noise),
+         "the model error is as smooth as the gap of which it is a share", fresh=True),
     Rule("tolerance", "search.problem:Problem.within_tolerance", second,
          "effects are screened with nuisance parameters within their tolerance",
          "_fit_neighbours"),

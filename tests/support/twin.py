@@ -15,11 +15,14 @@ Floats = NDArray[np.float64]
 POOL = read_deck(1).rigs
 STEP_N = 20.0
 RATE_Hz = 120
-# Effects that no twin has: of a joint that turns, and of an aircraft moved by all controls.
+# Effects that no twin has: of a joint that turns, of an imposed motion, and of an aircraft moved by
+# all controls.
 WITHOUT_TWIN = {
-    *("gravity", "aileron_effectiveness", "rudder_effectiveness", "roll_damping", "yaw_damping"),
+    *("gravity", "yielding_contact", "regressor_force", "regressor_friction"),
+    *("aileron_effectiveness", "rudder_effectiveness", "roll_damping", "yaw_damping"),
     *("dihedral_effect", "directional_stability", "side_force_slope", "adverse_yaw", "drag"),
     *("thrust", "roll_inertia", "pitch_inertia", "yaw_inertia", "center_of_gravity"),
+    "lateral_gust",
 }
 
 

@@ -6,12 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from coupled.blind.trials.deck import read_deck
 from coupled.blind.trials.key import Key
 from coupled.blind.trials.readings import same_law
 from coupled.blind.trials.truth import Truth
 from coupled.errors import InputError
 from coupled.files import read_json
-from coupled.gap.findings.result import KeptEffect, diagnosis_from
+from coupled.gap.findings.result import KeptEffect, diagnosis_from, placed
 
 NAMING = ("effect", "mostly")  # verdicts that name effects as certain
 MISSING = "missing"  # the verdict of a record without a diagnosis
@@ -150,13 +151,16 @@ def read_answers(folder: Path, key: Key) -> list[Answer]:
     """Return an answer for each record of the key. Raises InputError."""
     if not folder.is_dir():
         raise InputError(folder, "", "is no folder; give that of the diagnoses, rNNN.json each")
-    answers = [_read(folder / f"{name}.json", truth) for name, truth in key.records.items()]
+    whole = read_deck(key.version).whole is not None
+    records = key.records.items()
+    answers = [_read(folder / f"{name}.json", truth, whole) for name, truth in records]
     if all(answer.verdict == MISSING for answer in answers):
         raise InputError(folder, "", "holds no diagnosis of any record of the key (rNNN.json)")
     return answers
 
 
-def _read(path: Path, truth: Truth) -> Answer:
+def _read(path: Path, truth: Truth, whole: bool) -> Answer:
+    """Return the answer of a file; of a `whole` aircraft its effects have their controls."""
     nothing: frozenset[str] = frozenset()
     if not path.is_file():
         return Answer(path.stem, truth, MISSING, {}, nothing, nothing, nothing, None)
@@ -164,13 +168,15 @@ def _read(path: Path, truth: Truth) -> Answer:
     rig = truth.rig if kept.made.rig is None else kept.made.rig
     if rig != truth.rig:
         raise InputError(path, "made.rig", f"is {rig}, in the key {truth.rig}: give this set's key")
-    found = {effect.name: _found(effect) for effect in kept.effects}
+    owners = {effect.name: effect.control if whole else None for effect in kept.effects}
+    found = {placed(one.name, one.control if whole else None): _found(one) for one in kept.effects}
+    rivals = [[placed(name, owners.get(group[0])) for name in group] for group in kept.rivals]
     return Answer(
         path.stem,
         truth,
         kept.verdict,
         found,
-        frozenset(found).union(*kept.rivals),
+        frozenset(found).union(*rivals),
         frozenset(name for name, stage in kept.stages.items() if stage.guilty),
         frozenset(channel for stage in kept.stages.values() for channel in stage.missing),
         kept.shrink.closed,

@@ -13,12 +13,14 @@ from pathlib import Path
 from typing import Any
 
 from coupled.blind.trials import NEWEST
+from coupled.blind.trials.whole import Whole
 from coupled.blind.twin.conditions import PLAIN, Realism
 from coupled.blind.twin.effects import EFFECTS
 from coupled.blind.twin.kinds import Kind
 from coupled.blind.twin.outsiders import OUTSIDERS
 from coupled.blind.twin.revision2 import REVISION_2
 from coupled.errors import InputError, nearest
+from coupled.gap.effects.library import BY_NAME
 from coupled.rig.rig import Rig
 from coupled.rig.rigfile import read_rig
 from coupled.schema import load_toml
@@ -32,7 +34,8 @@ DEFAULT = NEWEST
 class Deck:
     """The pool of a version's trials.
 
-    `built`: budgets and readings are of the rig as built, with its other properties.
+    `built`: budgets and readings are of the rig as built, with its other properties. `whole`: the
+    records are of whole aircraft, with effects of their own.
     """
 
     version: int
@@ -41,6 +44,7 @@ class Deck:
     rigs: Mapping[str, Rig]
     realism: Realism = PLAIN
     built: bool = False
+    whole: Whole | None = None
 
     def kinds(self, category: str) -> tuple[Kind, ...]:
         """Return the kinds that a trial of a category may have."""
@@ -61,18 +65,26 @@ def read_deck(version: int) -> Deck:
     table = load_toml(path)
     if "like" in table:
         like = read_deck(int(str(table["like"]).removeprefix("v")))
-        more = _chosen(path, "more", table, (*EFFECTS, *REVISION_2)) if "more" in table else ()
-        built, effects = table["truth"] == "built", (*like.effects, *more)
-        return replace(like, version=version, built=built, effects=effects)
-    homes = VERSIONS / str(table.get("rigs_of", folder.name)) / "rigs"
-    rigs = {str(name): read_rig(homes / f"{name}.toml") for name in table["rigs"]}
+        return replace(like, version=version, built=table["truth"] == "built")
+    if "airframe" in table:
+        whole = Whole(*(table[name] for name in ("airframe", "control", "force_N", "noise")))
+        for name in (*whole.airframe, *whole.control):
+            if name not in BY_NAME:
+                raise InputError(path, name, f"is no effect; {nearest(name, BY_NAME)}")
+        return Deck(version, (), (), _rigs(folder, table), whole=whole)
+    homes = VERSIONS / str(table.get("rigs_of", folder.name))
     return Deck(
         version,
         _sized(path, table, _chosen(path, "effects", table, (*EFFECTS, *REVISION_2))),
         _chosen(path, "outsiders", table, OUTSIDERS),
-        rigs,
+        _rigs(homes, table),
         _realism(table.get("realism")),
     )
+
+
+def _rigs(home: Path, table: Mapping[str, Any]) -> dict[str, Rig]:
+    """Return the rigs that a deck names, from the folder of a version."""
+    return {str(name): read_rig(home / "rigs" / f"{name}.toml") for name in table["rigs"]}
 
 
 def _sized(path: Path, table: Mapping[str, Any], kinds: tuple[Kind, ...]) -> tuple[Kind, ...]:

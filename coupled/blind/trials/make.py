@@ -171,7 +171,8 @@ def make_one(numbers: Numbers, i: int, plan: Plan) -> tuple[int, Truth, str]:
 def _drawn(numbers: Numbers) -> tuple[Deck, Mapping[str, Rig]]:
     """Return the deck of a set and its rigs, cached in each worker."""
     deck = read_deck(numbers.version)
-    return deck, rig_pool(deck.rigs, numbers.seed, numbers.rigs)
+    others = numbers.rigs if deck.whole is None else 0
+    return deck, rig_pool(deck.rigs, numbers.seed, others)
 
 
 def _finished(places: Places, asked: Numbers, any_seed: bool) -> Numbers | None:

@@ -69,6 +69,8 @@ class _Sized:
 
 def plans(rng: Rng, records: int, deck: Deck) -> list[Plan]:
     """Return the plan of each record, in random order, with every kind about equally often."""
+    if deck.whole is not None:
+        return [Plan(*one) for one in deck.whole.plans(rng, records)]
     counts = {category: math.floor(share * records) for category, share in SHARES.items()}
     counts["single"] += records - sum(counts.values())
     known = [kind.name for kind in deck.effects]
@@ -104,6 +106,8 @@ def draw_trial(rng: Rng, plan: Plan, deck: Deck, pool: Mapping[str, Rig]) -> Tri
     If the effects cannot be made large enough on one rig, another rig is drawn; after many, the
     kinds themselves are drawn again, so that the loop always ends.
     """
+    if deck.whole is not None:
+        return Trial(*deck.whole.draw(rng, plan.category, plan.names, pool))
     kinds = [deck.kind(plan.category, name) for name in plan.names]
     for attempt in range(60):
         if attempt and attempt % 12 == 0 and plan.category in ("pair", "outsider"):

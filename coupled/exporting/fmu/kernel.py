@@ -49,8 +49,8 @@ def frame(
     run_frame(p, s, script[0, 0], script[0, 1], 0, load_factor)
     sampled = s.sensing.computed if p.sensing.skewed else s.loader.computed
     out[ROW - 2] = read_computed(p.sensing, sampled, s.modification.frames, 0.0)
-    at = deflection(p.linkage, s.linkage, s.hand.force)
-    out[ROW - 1] = read_grip(p.sensing, transducer(p.linkage, at)) + p.sensing.deflection_zero
+    at = transducer(p.linkage, deflection(p.linkage, s.linkage, s.hand.force))
+    out[ROW - 1] = read_grip(p.sensing, at, s.hand.force) + p.sensing.deflection_zero
     return float(command)
 
 

@@ -127,7 +127,7 @@ def _number(law: Law, state: State, file: object, place: str, wanted: str) -> fl
         raise
     if type(value) is not float:
         if isinstance(value, bool) or not isinstance(value, Real):
-            said = shown_value(value)
+            said = shown_value(value).replace("of type", "a value of type")
             problem = f"{name_of(law)} returned {said} {time_of(state)}; return {wanted}"
             raise InputError(file, place, problem)
         value = float(value)

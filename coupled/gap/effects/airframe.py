@@ -19,8 +19,12 @@ from coupled.gap.effects.effect import (
     one,
     value,
 )
-from coupled.gap.signals.air import NEEDS as AIR
-from coupled.gap.signals.air import spread_of_air
+from coupled.gap.signals.air import (
+    NEEDS,
+    NEEDS_ACROSS,
+    spread_of_air,
+    spread_of_crossing_air,
+)
 
 _ROLL, _YAW, _SLIP = "roll_rate_rad_per_s", "yaw_rate_rad_per_s", "sideslip_rad"
 TERM = "term"  # the name of an effect of a named function, in the JSON
@@ -45,6 +49,15 @@ def _factor_on(
     """Return the effect of a factor of the rig's `flight` section."""
     number = factor(f"flight.{name}", start, *bounds)
     return replace(one("airframe", name, number, x, y, drawing, 4.0), needs=needs)
+
+
+def _gust(name: str, key: str, drawn: str, needs: tuple[str, ...]) -> Effect:
+    """Return the effect of gusts, by the key of their rms."""
+    number = value("rms_m_per_s", f"flight.{key}", 0, 30, 0.5)
+    error = Sampled(spread_of_crossing_air if name == "lateral_gust" else spread_of_air)
+    return replace(
+        one("airframe", name, number, "", drawn, "time", 6.0), needs=needs, sampled=error
+    )
 
 
 AIRFRAME: tuple[Effect, ...] = (
@@ -72,16 +85,8 @@ AIRFRAME: tuple[Effect, ...] = (
         added("aft_m", "flight.cg_aft_m", -2.0, 2.0, 0.02),
         *("alpha", "pitch_rate", "loop", 4.0),
     ),
-    replace(
-        one(
-            "airframe",
-            "vertical_gust",
-            value("rms_m_per_s", "flight.gust_rms_m_per_s", 0, 30, 0.5),
-            *("", "air", "time", 6.0),
-        ),
-        needs=AIR,
-        sampled=Sampled(spread_of_air),
-    ),
+    _gust("vertical_gust", "gust_rms_m_per_s", "air", NEEDS),
+    _gust("lateral_gust", "lateral_gust_rms_m_per_s", "crossing_air", NEEDS_ACROSS),
 )
 
 

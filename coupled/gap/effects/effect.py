@@ -16,10 +16,10 @@ from coupled.errors import InputError
 from coupled.gap.chain import BY_NAME as STAGE_OF
 from coupled.gap.signals.output import Floats, Output
 from coupled.gap.thresholds import LIGHT_LOAD_N, MODEL_ERROR
-from coupled.record.channels import ControlName, channel, unit_of
+from coupled.record.channels import ControlName, channel, unit_at_end, unit_of
 from coupled.record.record import Record
 from coupled.rig.crossing import leaking
-from coupled.rig.rig import Rig
+from coupled.rig.rig import Rig, with_values
 from coupled.schema import SMALLEST, Section, file_keys
 
 Mode = Literal["value", "factor", "added", "switch", "yields"]
@@ -110,6 +110,8 @@ class Parameter:
             return ""
         last = self.key_on(control).rpartition(".")[2]
         unit = last.removeprefix(field_of(rig, control, self.key)).lstrip("_")
+        if self.key in BY_REGRESSOR:
+            unit = unit.replace(UNIT, regressor_unit(rig, control))
         over, _, under = unit.partition("per_")
         text = (over.strip("_") or "1") + "/" + under.strip("_") if under else unit
         return text.replace("_", "·").removesuffix("3") + ("³" if text.endswith("3") else "")
@@ -177,6 +179,10 @@ class Signature:
 
 
 OTHER_FORCE = "another control's force"
+# Force and friction for each unit of the regressor, a channel that the rig file names. In names of
+# parameters its unit takes the place of `UNIT`.
+BY_REGRESSOR = ("loader.regressor_force_N_per_unit", "loader.regressor_friction_N_per_unit")
+UNIT = "unit"
 TERMS = "terms."  # before the name of an aerodynamic function, in keys of the flight
 
 
@@ -184,11 +190,11 @@ class Sampled(NamedTuple):
     """The sampling error of a random effect.
 
     `error` returns the relative standard error of the fitted value as an estimate of the process
-    parameter, given a record and its frame time, s. `times` returns the times of events, s from the
+    parameter, given the nominal rig and a record. `times` returns the times of events, s from the
     record's start; it is None for a continuous process.
     """
 
-    error: Callable[[Record, float], float]
+    error: Callable[[Rig, Record], float]
     times: Callable[[Record], Floats] | None = None
 
 
@@ -269,6 +275,12 @@ def field_of(rig: Rig, control: ControlName, key: str) -> str:
     return _fields(type(holder), d)[last.format(d=d)]
 
 
+def regressor_unit(rig: Rig, control: ControlName) -> str:
+    """Return the unit of the channel that a rig file names as regressor."""
+    name = rig.controls[control].loader.regressor
+    return UNIT if name is None else unit_at_end(name)
+
+
 def apply(
     rig: Rig, control: ControlName, effects: Sequence[Effect], values: Mapping[str, float]
 ) -> Rig:
@@ -297,7 +309,7 @@ def apply(
         changes["compensation.basic_gradient_N_per_{d}"] = data.assumed_basic_gradient
         changes["compensation.breakout_N"] = data.assumed_breakout
     d = unit_of(control)
-    return rig.changed({dotted(key, control).format(d=d): new for key, new in changes.items()})
+    return with_values(rig, {dotted(key, control).format(d=d): new for key, new in changes.items()})
 
 
 def possible(

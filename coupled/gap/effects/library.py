@@ -7,10 +7,23 @@ screen, the fit and the plot.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 from coupled.gap.effects.airframe import AIRFRAME
-from coupled.gap.effects.effect import Effect, added, factor, limit, one, setting_of, value
+from coupled.gap.effects.effect import (
+    BY_REGRESSOR,
+    UNIT,
+    Effect,
+    added,
+    factor,
+    keys_of,
+    limit,
+    one,
+    regressor_unit,
+    setting_of,
+    value,
+)
 from coupled.gap.effects.linkage import LINKAGE, without_servo
 from coupled.gap.effects.loader import LOADER
 from coupled.gap.effects.sensing import COMPENSATION, SENSING
@@ -85,19 +98,40 @@ def library_of(rig: Rig, control: ControlName) -> list[Effect]:
     """Return the library adapted to a rig; of an aircraft alone, the effects of its `flight`.
 
     A bob weight pulls with the load factor: with one, a time stamp error of the motion also shows
-    in the loader. A rig without a servo has other effects of a servo (`without_servo`).
+    in the loader. So do errors of a schedule that is a curve, which no channel records. A rig
+    without a servo has other effects of a servo (`without_servo`). The effects of a regressor have
+    its unit in their names; a rig that names none has none of them.
     """
     every = list(EFFECTS)
     if not rig.controls:
         return [one for one in every if all(p.key.startswith("flight.") for p in one.parameters)]
     if rig.controls[control].loader.servo_frequency == 0.0:
         every = without_servo(EFFECTS)
-    if rig.flight is None or not rig.controls[control].loader.bob_weight:
-        return every
+    data, further = rig.controls[control], dict[str, tuple[str, ...]]()
+    if data.schedule.curved:
+        of_schedule = (one.name for one in every if one.stage == "schedule")
+        further |= dict.fromkeys(of_schedule, ("loader", "multiplier"))
+    if rig.flight is not None and data.loader.bob_weight:
+        further[MOTION] = ("loader",)
+    every = _of_regressor(every, rig, control)
     return [
-        replace(one, outputs=(*one.shows_in, "loader")) if one.name == MOTION else one
+        replace(one, outputs=(*one.shows_in, *further[one.name])) if one.name in further else one
         for one in every
     ]
+
+
+def _of_regressor(every: Sequence[Effect], rig: Rig, control: ControlName) -> list[Effect]:
+    """Return a library with the effects of the regressor in its unit, or without them."""
+    unit = regressor_unit(rig, control)
+
+    def named(effect: Effect) -> Effect:
+        (p,) = effect.parameters
+        return replace(effect, parameters=(replace(p, name=p.name.replace(UNIT, unit)),))
+
+    of_it = {one.name for one in every if keys_of([one]) & {*BY_REGRESSOR}}
+    if rig.controls[control].loader.regressor is None:
+        return [one for one in every if one.name not in of_it]
+    return [named(one) if one.name in of_it else one for one in every]
 
 
 def _ends(effect: Effect) -> tuple[float, float, float]:

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from coupled.gap.effects.effect import (
     Effect,
+    ModelError,
     Signature,
     added,
     bend_beside,
@@ -17,7 +18,7 @@ from coupled.gap.effects.effect import (
     switch,
     value,
 )
-from coupled.gap.thresholds import SETTING
+from coupled.gap.thresholds import SETTING, YIELDING_ERROR
 
 SERVO = "loader.servo_frequency_Hz"
 DAMPING_RATIO = replace(
@@ -25,6 +26,11 @@ DAMPING_RATIO = replace(
     name="damping_factor",
     role="other",
     may_end=True,
+)
+# A stiff contact closes within a frame, so its stiffness is known no better than a friction's.
+_CONTACT = replace(
+    limit("stiffness_N_per_{d}", "loader.play_stiffness_N_per_{d}", 1e3, 1e8, 5e5, 1e5, 2e4),
+    model_error=ModelError(YIELDING_ERROR),
 )
 LINKAGE: tuple[Effect, ...] = (
     one("linkage", "bend", real_bend(5e-5), *("force", "bent")),
@@ -46,17 +52,13 @@ LINKAGE: tuple[Effect, ...] = (
         "linkage",
         (
             added("play_{d}", "loader.play_{d}", 0, 0.1, 1e-3),
-            replace(
-                limit(
-                    *("stiffness_N_per_{d}", "loader.play_stiffness_N_per_{d}"),
-                    *(1e3, 1e8, 5e5, 1e5, 2e4),
-                ),
-                role="shape",
-            ),
+            replace(_CONTACT, role="shape"),
         ),
         Signature("force", "deflection_left", "loop"),
-        contains=("backlash",),
+        contains=("backlash", "yielding_contact"),
     ),
+    # Of a loader whose motion is imposed; otherwise, and of the grip, a bend is the same.
+    one("linkage", "yielding_contact", _CONTACT, *("speed", "missing", "loop")),
     Effect(
         "bend_hysteresis",
         "linkage",

@@ -9,6 +9,7 @@ import math
 from dataclasses import replace
 
 from coupled.gap.effects.effect import (
+    BY_REGRESSOR,
     OTHER_FORCE,
     Effect,
     ModelError,
@@ -22,7 +23,7 @@ from coupled.gap.effects.effect import (
     value,
 )
 from coupled.gap.effects.seen import ripples, stops
-from coupled.gap.thresholds import SETTING, YIELDING_ERROR, CLOCK_s
+from coupled.gap.thresholds import OTHER_SCALE, SETTING, YIELDING_ERROR, CLOCK_s
 
 _DRAWN = Signature("speed", "missing")
 
@@ -54,6 +55,14 @@ def _one_way(name: str, *starts_N: float) -> Parameter:
     """Return the friction in one direction of motion above the nominal one."""
     number = Parameter(name, f"loader.friction_{name}", "added", 0, 60, starts_N)
     return replace(number, may_end=True)
+
+
+def _per_unit(name: str, key: str) -> Parameter:
+    """Return a size for each unit of the regressor, in RMS forces per its standard deviation.
+
+    `scales` converts starts and bounds to those of records.
+    """
+    return Parameter(name, key, "added", -OTHER_SCALE, OTHER_SCALE, (0.1, -0.1))
 
 
 FRICTIONS: tuple[Effect, ...] = (
@@ -92,6 +101,13 @@ FRICTIONS: tuple[Effect, ...] = (
         "loader",
         (Parameter("factor", "loader.friction_by_load", "added", 0, 0.8, (0.03,)),),
         Signature("force", "missing"),
+        dry=True,
+    ),
+    Effect(
+        "regressor_friction",
+        "loader",
+        (_per_unit("friction_N_per_unit", BY_REGRESSOR[1]),),
+        _DRAWN,
         dry=True,
     ),
 )
@@ -149,6 +165,12 @@ LOADER: tuple[Effect, ...] = (
         "force_offset",
         added("offset_N", "loader.offset_N", -100, 100, 1.0),
         *("computed", "missing"),
+    ),
+    one(
+        "loader",
+        "regressor_force",
+        _per_unit("force_N_per_unit", BY_REGRESSOR[0]),
+        *("regressor", "missing"),
     ),
     replace(
         one(

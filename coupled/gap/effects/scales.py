@@ -7,6 +7,9 @@ equals the rms force, and damping of one scale balances it at the rms speed.
 The library's starts and bounds suit a control column. For a machine of another order of magnitude
 they are multiplied by Fᵃ·xᵇ over the column's, so that the fits do not depend on units. A bound of
 a force is at least several times the rms force.
+
+Parameters for each unit of a regressor have starts and bounds in rms forces over its standard
+deviation.
 """
 
 from __future__ import annotations
@@ -17,7 +20,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from coupled.gap.effects.effect import Effect, Parameter
+from coupled.gap.effects.effect import BY_REGRESSOR, Effect, Parameter
 from coupled.gap.noise.smooth import rate_of, smoothed
 from coupled.gap.signals.reading import Reading
 from coupled.gap.thresholds import COLUMN_FORCE_N, COLUMN_WAY, OTHER_SCALE
@@ -40,16 +43,20 @@ EXPONENTS = {"²": 2, "³": 3, "2": 2, "3": 3}
 
 @dataclass(frozen=True)
 class Scales:
-    """The rms of a control's force in N and motion in d, and their time in s, over records."""
+    """The rms of a control's force in N and motion in d, and their time in s, over records.
+
+    `regressor` is the standard deviation of the regressor, 0 without one.
+    """
 
     force_N: float
     way: float
     time_s: float
+    regressor: float = 0.0
 
     @classmethod
     def of(cls, readings: Sequence[Reading]) -> Scales | None:
         """Return the scales of records; None where they lack force or motion, or nothing moves."""
-        forces, ways, speeds = [], [], []
+        forces, ways, speeds, others = [], [], [], []
         for reading in readings:
             names = (reading.name_of(quantity) for quantity in ("computed", "deflection"))
             moved = next((name for name in names if name in reading.record), None)
@@ -59,12 +66,15 @@ class Scales:
             forces.append(reading.record[reading.name_of("force")])
             ways.append(way - way.mean())
             speeds.append(rate_of(way, reading.rig.frame_rate))
+            if (other := reading.regressor()) is not None:
+                others.append(other)
         if not forces:
             return None
         force, way_d, speed = (
             float(np.sqrt(np.mean(np.concatenate(each) ** 2))) for each in (forces, ways, speeds)
         )
-        return cls(force, way_d, way_d / speed) if min(force, way_d, speed) > 0.0 else None
+        spread = float(np.std(np.concatenate(others))) if others else 0.0
+        return cls(force, way_d, way_d / speed, spread) if min(force, way_d, speed) > 0.0 else None
 
     def size(self, unit: str) -> float | None:
         """Return the scale of a parameter by its unit, such as N·s/m; None for an unknown unit."""
@@ -101,6 +111,10 @@ def _scaled(p: Parameter, scales: Scales, rig: Rig, control: ControlName) -> Par
     """Return a parameter with scaled starts and bounds."""
     if p.mode not in ("added", "value") or p.key.startswith("flight."):
         return p
+    if p.key in BY_REGRESSOR:
+        times = scales.force_N / scales.regressor if scales.regressor > 0.0 else 1.0
+        starts = tuple(times * start for start in p.starts)
+        return replace(p, low=times * p.low, high=times * p.high, starts=starts)
     unit = p.unit(rig, control)
     if unit == "rad" and "{d}" not in p.key:  # a phase, which does not grow with the motion
         return p

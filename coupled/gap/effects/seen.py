@@ -104,7 +104,7 @@ def _answer(output: Output, rig: Rig, control: ControlName) -> Complex:
     """Return the loader's frequency response to a friction force, d/N."""
     data = rig.controls[control]
     turns = 2.0 * np.pi * np.fft.fftfreq(len(output.measured), 1.0 / output.frame_rate_Hz)
-    gradient = float(np.mean(data.schedule.total_gradient))
+    gradient = float(np.mean(data.schedule.gradients))
     stiff = gradient + 1j * turns * data.loader.damping - turns**2 * data.loader.mass
     return np.asarray(-1.0 / np.where(stiff == 0.0, np.inf, stiff))
 

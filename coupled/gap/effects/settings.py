@@ -6,6 +6,7 @@ nominal rig fitted to records of the machine (`nominal`) has the tolerance of ea
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -92,7 +93,7 @@ def is_dry(rig: Rig, control: ControlName) -> bool:
         return False
     loader = rig.controls[control].loader
     levels = (loader.friction, loader.breakaway, loader.friction_pull, loader.friction_push)
-    return max(*levels, loader.friction_by_load) > 0.0
+    return any((*levels, loader.friction_by_load, loader.regressor_friction))
 
 
 def _ends(effect: Effect, rig: Rig, control: ControlName) -> tuple[float, float, float] | None:
@@ -117,7 +118,8 @@ def _ends(effect: Effect, rig: Rig, control: ControlName) -> tuple[float, float,
         else:
             tolerance = filed_tolerance
             # At most the filed value is removed: friction is not negative.
-            floor = number.low if number.mode == "value" else min(number.low, 0.0) - abs(filed)
+            floor = -math.inf if number.low < 0.0 else -abs(filed)
+            floor = number.low if number.mode == "value" else floor
             return max(neutral - tolerance, floor), neutral + tolerance, neutral
     if tolerance <= 0.0:
         return None

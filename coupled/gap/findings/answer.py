@@ -207,5 +207,5 @@ def _sample_error(effect: Effect, readers: Sequence[Reader]) -> float:
     if effect.sampled is None:
         return 0.0
     error = effect.sampled.error
-    each = [error(reader.record, 1.0 / reader.rig.frame_rate) for reader in readers]
+    each = [error(reader.rig, reader.record) for reader in readers]
     return float(np.sqrt(np.sum(np.square(each)))) / len(each)

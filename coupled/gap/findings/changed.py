@@ -1,29 +1,40 @@
 """Whether a machine changed since its healthy records: a test of simple features.
 
-A model that misses the healthy machine cannot judge by noise. The residual of a signal,
-and the force itself, are therefore condensed to features of a whole record: the mean by direction,
-speed and position of the motion, the spread about these means, and the roughness, both as natural
-logarithms. One record gives one value of a feature, so the scatter between healthy records holds
-all that differs from day to day.
+A model that misses the healthy machine cannot judge by noise. The residual of a signal, and the
+force itself, are therefore condensed to features of a whole record: the coefficients of its
+regression, the spread about it, and the roughness, both as natural logarithms. The regression is
+the textbook one of a machine with friction, over all frames that move,
 
-A feature x of m records is tested against n healthy ones by a prediction interval for normal
-values (Hahn and Meeker, Statistical Intervals, 1991, ch. 4):
+    y = a₀ + a·sgn v + b·(v − v̄·sgn v) + k·(x − x̄) + m·v'
 
-    |x̄ − x̄_h| > t(1 − αw/2; n − 1)·s·√(1/m + 1/n) + e
+with v̄ and x̄ of the healthy records, and b, k and m times the rms of their regressors there. A
+motion in one direction has no a. The coefficients part friction from damping and from an offset,
+and none depends on how often a speed occurs. One record gives one value of a feature, so the
+scatter between healthy records holds all that differs from day to day. The means a₀ ± a of either
+direction would both scatter as the friction does, and hide an offset that does not.
 
-s is the standard deviation between healthy records. The weights w of all features add up to 1
-(Bonferroni), so that all tests together give a false alarm in at most a share α of healthy records:
-half of the weight is that of the means by direction alone, for which few healthy records suffice. e
-is what another motion may change, up to its square: twice the relative excess of the motion's rms
-place, mean place or rms speed over its own prediction interval, times the rms of the signal. The
-size of change that is shown with probability 0.9 follows from the noncentral t distribution.
+A feature x of m records is tested against n healthy ones by a prediction interval for normal values
+(Hahn and Meeker, Statistical Intervals, 1991, ch. 4):
+
+    |x̄ − x̄_h| > t(1 − αw/2; n − 1)·√(s²·(1/m + 1/n) + d²/m) + e
+
+s is the standard deviation between healthy records; of a residual's coefficients it is at least a
+tenth of the noise floor, since errors of counting do not average out. d² is by how much the mean
+variance of a tested record's coefficients, from the regression and its residual's correlation time,
+exceeds that of the healthy ones: a motion of one speed hardly determines b. The weights w of all
+features add up to 1 (Bonferroni), so that all tests together give a false alarm in at most a share
+α of healthy records: half of the weight is that of a and b of the force, and of the other
+stages' signals, for which few healthy records suffice. e is what another motion may change, up to
+its square: twice the relative excess of the motion's rms place, mean place or rms speed over its
+own prediction interval, times the rms of the signal. The size of change that is shown with
+probability 0.9 follows from the noncentral t distribution.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -32,15 +43,20 @@ from scipy.special import nctdtrinc, stdtrit
 
 from coupled.display import unit_in
 from coupled.gap.noise.smooth import rate_of, smoothed
-from coupled.gap.signals.output import Output
-from coupled.gap.thresholds import CHANGE_CHANCE, FEW, NEARLY_ALL, ROUNDING_SPAN, SMALL
+from coupled.gap.signals.output import Output, memory
+from coupled.gap.thresholds import CHANGE_CHANCE, FEW, NEARLY_ALL, ROUNDING_SPAN, SMALL, TINY
 from coupled.record.channels import ControlName, channel
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
 
 Floats = NDArray[np.float64]
 SIDES = ((1, "positive"), (-1, "negative"))
-FIRST = tuple(f"mean in {direction} direction" for _, direction in SIDES)
+# The levels of motion in both directions: a and a₀. A motion in one has a mean only.
+LEVEL, MIDDLE = "half difference of the directions", "mean of both directions"
+LEVELS = (LEVEL, *(f"mean in {direction} direction" for _, direction in SIDES))
+SLOPES = ("slope over the speed", "slope over the place", "slope over the acceleration")
+FIRST = (*LEVELS, SLOPES[0])
+LINEAR = ("half", "mean", "slope")
 
 
 @dataclass(frozen=True)
@@ -59,19 +75,26 @@ class Interval:
 
     @classmethod
     def of(
-        cls, well: Floats, now: Floats, chance: float, unsure: float = 0.0, least: float = 0.0
+        cls,
+        well: Floats,
+        now: Floats,
+        chance: float,
+        unsure: float = 0.0,
+        least: float = 0.0,
+        more: float = 0.0,
     ) -> Interval:
         """Return the two-sided interval at a probability of a false alarm, `chance`.
 
         `well` and `now` have one value a record; `unsure` is added to the limits; `least` is the
-        least standard deviation that is taken for the healthy ones.
+        least standard deviation that is taken for the healthy ones; `more` is the variance of a
+        value of `now` beyond that of a healthy one.
         """
         n, m = len(well), len(now)
         difference = float(now.mean() - well.mean())
         if n < 2:
             return cls(difference, math.inf, math.inf, math.inf)
         scatter = max(float(np.std(well, ddof=1)), least)
-        error = scatter * math.sqrt(1.0 / m + 1.0 / n)
+        error = math.sqrt(scatter**2 * (1.0 / m + 1.0 / n) + more / m)
         times = float(stdtrit(n - 1, 1.0 - 0.5 * chance))
         noncentral = float(nctdtrinc(n - 1, 1.0 - NEARLY_ALL, times))
         shown = noncentral * error + unsure if math.isfinite(noncentral) else math.inf
@@ -94,8 +117,8 @@ class Change:
 
     @property
     def is_mean(self) -> bool:
-        """Whether the feature is a mean, in the unit of its signal."""
-        return self.feature.startswith("mean")
+        """Whether the feature is a mean or a slope, in the unit of its signal."""
+        return self.feature.startswith(LINEAR)
 
     @property
     def beyond(self) -> float:
@@ -131,7 +154,7 @@ class Comparison:
     """All features of some records tested against healthy ones.
 
     `shown` is the change of a mean in each stage, relative to the rms of its channel, that would
-    have been shown: of the signal and the part of its motion in which the test is most sensitive.
+    have been shown: of the signal and the direction in which the test is most sensitive.
     """
 
     healthy: int
@@ -193,6 +216,42 @@ class _Moved:
 
 
 @dataclass(frozen=True)
+class _Motions:
+    """The motions of healthy records, about which a signal is regressed.
+
+    `still` is the speed below which nothing moves, d/s, `middle` the mean speed and the median
+    place, `sizes` the rms of each regressor about them.
+    """
+
+    still: float
+    middle: tuple[float, float]
+    sizes: Floats
+
+    @classmethod
+    def of(cls, motions: Sequence[_Moved]) -> _Motions:
+        """Return the numbers of some motions."""
+        place, speed = (
+            np.concatenate([getattr(m, n) for m in motions]) for n in ("place", "speed")
+        )
+        still = SMALL * float(np.sqrt(np.mean(speed**2)))
+        moving = np.abs(speed) > still
+        usual = float(np.mean(np.abs(speed[moving]))) if moving.any() else still
+        known = cls(still, (usual, float(np.median(place))), np.ones(len(SLOPES)))
+        each = [np.concatenate(one) for one in zip(*map(known.regressors, motions), strict=True)]
+        sizes = np.array([np.sqrt(np.mean(one[moving] ** 2)) for one in each])
+        return replace(known, sizes=np.maximum(sizes, 1e-300))
+
+    def regressors(self, moved: _Moved) -> list[Floats]:
+        """Return speed, place and acceleration of a motion, in units of the healthy ones."""
+        usual, middle = self.middle
+        speed, place = moved.speed - usual * np.sign(moved.speed), moved.place - middle
+        return [
+            one / size
+            for one, size in zip((speed, place, np.gradient(moved.speed)), self.sizes, strict=True)
+        ]
+
+
+@dataclass(frozen=True)
 class _Signal:
     """A signal of one record, with the motion beside it."""
 
@@ -201,6 +260,7 @@ class _Signal:
     values: Floats
     moved: _Moved
     channel_rms: float  # of the channel that it is of
+    least: float  # standard deviation of a coefficient from record to record, at the least
 
 
 Signals = Sequence[Mapping[str, _Signal]]
@@ -219,10 +279,15 @@ def compare(
     the control is tested too.
     """
     healthy, tested = (_signals(rig, control, *each, force) for each in (well, now))
+    pull = channel(control, "force")
     names = [name for name in healthy[0] if all(name in one for one in (*healthy, *tested))]
     features = {name: _features(healthy, tested, name) for name in names}
     every = [feature for each in features.values() for feature in each]
-    first = sum(feature in FIRST for feature in every)
+    is_first = {
+        name: pull not in names or name == pull or healthy[0][name].stage != "loader"
+        for name in names
+    }
+    first = sum(is_first[name] and one in FIRST for name in names for one in features[name])
     chances = {True: 0.5 / max(first, 1), False: 0.5 / max(len(every) - first, 1)}
     found, shown = [], dict[str, float]()
     for name, each in features.items():
@@ -230,14 +295,17 @@ def compare(
         excess = _excess([one.moved for one in ours], [one[name].moved for one in tested])
         size = float(np.sqrt(np.mean([np.mean(one.values**2) for one in ours])))
         stage, channel_rms = ours[0].stage, float(np.mean([one.channel_rms for one in ours]))
-        for feature, values in each.items():
-            chance = CHANGE_CHANCE * chances[feature in FIRST]
-            mean = feature.startswith("mean")
+        for feature, (before, after) in each.items():
+            chance = CHANGE_CHANCE * chances[is_first[name] and feature in FIRST]
+            mean = feature.startswith(LINEAR)
             own = size if mean else 1.0
             more = 2.0 * (excess * own if mean else math.log1p(excess))
-            interval = Interval.of(*values, chance, more, ROUNDING_SPAN * own)
+            beyond = max(float(after[:, 1].mean() - before[:, 1].mean()), 0.0)
+            values = before[:, 0], after[:, 0]
+            least = max(one.least for one in ours) if mean else ROUNDING_SPAN
+            interval = Interval.of(*values, chance, more, least, beyond)
             found.append(Change(stage, name, feature, interval))
-            if mean and channel_rms > 0.0:
+            if feature in LEVELS and channel_rms > 0.0:
                 shown[stage] = min(shown.get(stage, math.inf), interval.shown / channel_rms)
     return Comparison(len(healthy), tuple(found), shown)
 
@@ -261,49 +329,54 @@ def _signals(
             if with_force and force in record:
                 pull = record[force]
                 rms = float(np.sqrt(np.mean(pull**2)))
-                ours[force] = _Signal("loader", force, pull, moved, rms)
+                ours[force] = _Signal("loader", force, pull, moved, rms, ROUNDING_SPAN * rms)
             for one in (o for o in outputs if o.record == number and len(o.measured) == len(place)):
                 name = f"{one.channel} beside its prediction"
                 left, rms = one.residual(rig) * one.floor, float(np.std(one.measured))
-                ours[name] = _Signal(one.stage, name, left, moved, rms)
+                ours[name] = _Signal(one.stage, name, left, moved, rms, SMALL * one.floor)
         found.append(ours)
     return found
 
 
 def _features(well: Signals, now: Signals, name: str) -> dict[str, tuple[Floats, Floats]]:
-    """Return a signal's features: of each healthy record, and of each tested one."""
-    pooled = [one[name].moved for one in well]
-    rates = np.abs(np.concatenate([one.speed for one in pooled]))
-    still = SMALL * float(np.sqrt(np.mean(rates**2)))
-    fast = float(np.median(rates[rates > still])) if (rates > still).any() else still
-    middle = float(np.median(np.concatenate([one.place for one in pooled])))
-    each = [[_condensed(one[name], still, fast, middle) for one in ours] for ours in (well, now)]
+    """Return a signal's features: of each healthy record, and of each tested one.
+
+    Shape (records, 2): the value, and the variance with which the record determines it.
+    """
+    about = _Motions.of([one[name].moved for one in well])
+    each = [[_condensed(one[name], about) for one in ours] for ours in (well, now)]
     kept = [key for key in each[0][0] if all(key in one for ours in each for one in ours)]
     columns = [{key: np.array([one[key] for one in ours]) for key in kept} for ours in each]
     return {key: (columns[0][key], columns[1][key]) for key in kept}
 
 
-def _condensed(signal: _Signal, still: float, fast: float, middle: float) -> dict[str, float]:
-    """Return the features of one signal; `still`, `fast` in d/s and `middle` in d part its bins."""
-    values, speed, high = signal.values, signal.moved.speed, signal.moved.place > middle
-    rates, found = np.abs(speed), dict[str, float]()
-    least = max(3, round(FEW * len(values)))
-    rough = np.abs(np.diff(values, 2, prepend=values[:2]))
-    for side, direction in SIDES:
-        moving = (side * speed > 0.0) & (rates > still)
-        about = np.zeros(len(values))
-        for pace, quick in (("slow", rates <= fast), ("fast", rates > fast)):
-            for half, there in (("lower", ~high), ("upper", high)):
-                rows = moving & quick & there
-                if rows.sum() >= least:
-                    mean = float(values[rows].mean())
-                    found[f"mean in {direction} direction, {pace}, {half} half"] = mean
-                    about[rows] = values[rows] - mean
-        if moving.sum() >= least:
-            found[f"mean in {direction} direction"] = float(values[moving].mean())
-            spread, roughness = (float(np.sqrt(np.mean(x[moving] ** 2))) for x in (about, rough))
-            found[f"spread in {direction} direction"] = math.log(max(spread, 1e-300))
-            found[f"roughness in {direction} direction"] = math.log(max(roughness, 1e-300))
+def _condensed(signal: _Signal, about: _Motions) -> dict[str, tuple[float, float]]:
+    """Return the features of one signal, and their variances, by its regression."""
+    values, found = signal.values, dict[str, tuple[float, float]]()
+    least = max(len(LEVELS) + len(SLOPES), round(FEW * len(values)))
+    moving = [side * signal.moved.speed > about.still for side, _ in SIDES]
+    sides = [(rows, name) for rows, (_, name) in zip(moving, SIDES, strict=True)]
+    sides = [(rows, name) for rows, name in sides if rows.sum() >= least]
+    if not sides:
+        return {}
+    every = np.logical_or.reduce([rows for rows, _ in sides])
+    steps, levels = [np.ones(len(values))], [f"mean in {sides[0][1]} direction"]
+    if len(sides) > 1:
+        steps, levels = [*steps, np.sign(signal.moved.speed)], [MIDDLE, LEVEL]
+    table = np.column_stack([*steps, *about.regressors(signal.moved)])[every]
+    known, _, rank, _ = np.linalg.lstsq(table, values[every], rcond=TINY)
+    left = np.zeros(len(values))
+    left[every] = values[every] - table @ known
+    if rank == table.shape[1]:
+        power = memory(left[every]) * float(np.mean(left[every] ** 2))
+        variances = power * np.diag(np.linalg.inv(table.T @ table))
+        each = zip(known.tolist(), variances.tolist(), strict=True)
+        found |= dict(zip((*levels, *SLOPES), each, strict=True))
+    rough = np.diff(values, 2, prepend=values[:2])
+    for rows, name in sides:
+        for what, signed in (("spread", left), ("roughness", rough)):
+            size = float(np.sqrt(np.mean(signed[rows] ** 2)))
+            found[f"{what} in {name} direction"] = math.log(max(size, 1e-300)), 0.0
     return found
 
 

@@ -1,4 +1,6 @@
-"""Piecewise linear functions with smoothness and nodes by the evidence, and closed forms.
+"""The laws of one signal that a rig may have as curves, their linear fits, and closed forms.
+
+The values at the nodes have a Gaussian prior, and so have the kinks, so that a curve is smooth:
 
     residual = J·θ + noise,   θ_i ~ N(0, S²),   kink_i ~ N(0, κ²·h_i)
 
@@ -18,22 +20,158 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.gap.findings.curvelaws import Law
+from coupled.display import split_unit
+from coupled.errors import InputError
 from coupled.gap.search.evidence import misfit
+from coupled.gap.search.problem import ModelError
 from coupled.gap.signals.output import Output, Part, memory
 from coupled.gap.thresholds import (
     CURVE_KINKS,
     CURVE_NODES,
+    CURVE_PLACES,
     PRIOR_EFFECT,
     PRIOR_NUMBER,
     PRIOR_SPAN,
     RIVAL_GAIN,
     UNDERSTATED,
 )
+from coupled.record.channels import ControlName, unit_of
+from coupled.rig.curves import BendCurve, GradientCurve, LoadCurve
+from coupled.rig.curves import Curve as RigCurve
+from coupled.rig.rig import Rig
+from coupled.schema import SMALLEST, file_keys
 
 Floats = NDArray[np.float64]
 WIDTH = PRIOR_SPAN / math.sqrt(2.0 * math.pi)  # prior's width over the size (`search.evidence`)
 Values = tuple[Floats, Floats]  # nodes and values of a curve
+
+
+@dataclass(frozen=True)
+class Law:
+    """A curve that a rig may have: its key of a control, its stage, and its signal.
+
+    `signal` is a name in `where.signals`, `symbol` that of closed forms. `scale` is a signal of the
+    size of its values. `by_size`: of the signal's size only. `anchored`: it vanishes at 0, where a
+    named effect acts. `is_map`: its value replaces the signal.
+    """
+
+    key: str
+    stage: str
+    signal: str
+    symbol: str
+    scale: str
+    by_size: bool = False
+    anchored: bool = False
+    is_map: bool = False
+
+
+LAWS = (
+    Law("loader.force_curve", "loader", "computed_{d}", "δ", "force_N"),
+    Law(
+        "loader.friction_curve",
+        "loader",
+        "computed_rate_{d}_per_s",
+        "v",
+        "force_N",
+        by_size=True,
+        anchored=True,
+    ),
+    Law("loader.load_curve", "loader", "force_N", "F", "force_N", by_size=True, anchored=True),
+    Law("loader.bend_curve", "linkage", "force_N", "F", "computed_{d}", anchored=True),
+    Law("sensing.grip_load_curve", "linkage", "force_N", "F", "computed_{d}", anchored=True),
+    Law("sensing.grip_curve", "linkage", "deflection_{d}", "δ", "deflection_{d}", is_map=True),
+    Law("sensing.deflection_curve", "sensing", "computed_{d}", "δ", "computed_{d}", is_map=True),
+    Law("sensing.force_curve", "sensing", "force_N", "F", "force_N", is_map=True),
+    Law("schedule.gradient_curve", "schedule", "dynamic_pressure_Pa", "q̄", "gradient_N_per_{d}"),
+    Law("rigging.command_curve", "surface", "estimate_{d}", "δ̂", "estimate_{d}", is_map=True),
+)
+
+
+def named(name: str, control: ControlName) -> str:
+    """Return the name of a signal on a control, with m or rad."""
+    return name.format(d=unit_of(control))
+
+
+def filed_curve(rig: Rig, control: ControlName, law: Law) -> RigCurve:
+    """Return the curve of a law that a rig has; without nodes, it has none."""
+    section, _, name = law.key.partition(".")
+    found: RigCurve = getattr(getattr(rig.controls[control], section), name)
+    return found
+
+
+def units_of(rig: Rig, control: ControlName, law: Law) -> tuple[str, str, str]:
+    """Return the keys of a law's nodes and values, and the unit of its values in text."""
+    of, values, *_ = file_keys(type(filed_curve(rig, control, law)), unit_of(control))
+    return of, values, split_unit(values)[1]
+
+
+def with_curve(
+    rig: Rig, control: ControlName, law: Law, nodes: Floats, values: Floats
+) -> Rig | None:
+    """Return the rig with a curve; None if no rig can have it.
+
+    The values of a map are added to the signal. Neither a map nor a bend may fall: where one
+    would, it is flat. Friction by load is not below 0. A curve of the schedule is constant beyond
+    its nodes.
+    """
+    kind = type(filed_curve(rig, control, law))
+    of, value, *_ = file_keys(kind, unit_of(control))
+    given = values
+    if kind is GradientCurve:  # held at its ends, as the schedule's table
+        beyond = 0.01 * float(nodes[-1] - nodes[0])
+        nodes = np.concatenate(([nodes[0] - beyond], nodes, [nodes[-1] + beyond]))
+        given = np.pad(values, 1, "edge")
+    if kind.MAP or kind is BendCurve:
+        line = nodes * (1.0 if kind.MAP else rig.controls[control].loader.least_bend)
+        raised = np.maximum.accumulate(values + line)
+        given = raised if kind.MAP else raised - line - np.interp(0.0, nodes, raised - line)
+    if kind is LoadCurve:
+        given = np.maximum(values, 0.0)
+    lists = {
+        name: np.where(np.abs(each) < SMALLEST, 0.0, each).tolist()
+        for name, each in ((of, nodes), (value, given))
+    }
+    try:
+        return rig.changed({f"controls.{control}.{law.key}": lists})
+    except InputError:
+        return None
+
+
+def rising(places: Floats) -> Floats:
+    """Return functions that rise from one place to the next, shape (places, functions).
+
+    They are 0 towards 0 and ±1 beyond; one is constant. A rig that may not have a falling curve
+    can have each, and together they span all functions that are linear between the places.
+    """
+    above = np.tri(len(places))
+    zero = np.flatnonzero(places == 0.0)
+    for k in range(int(zero[0]) if zero.size else 0):
+        above[:, k] = -1.0 * (np.arange(len(places)) <= k)
+    if zero.size:
+        above[:, zero[0]] = 1.0
+    return above
+
+
+def places_of(signal: Floats, law: Law, entries: Sequence[float]) -> Floats:
+    """Return where a curve may have nodes: evenly spaced, at quantiles, at 0 and at entries.
+
+    From the least value of the signal to the largest; through 0, where the signal has both signs.
+    """
+    low, high = float(signal.min()), float(signal.max())
+    if law.by_size:
+        low = 0.0
+    elif law.stage != "schedule":
+        width = max(abs(low), abs(high))
+        low, high = min(low, -1e-2 * width), max(high, 1e-2 * width)
+    near = 0.4 * (high - low) / CURVE_PLACES
+    fixed = [low, high, *(x for x in entries if low < x < high)]
+    fixed += [0.0] if low < 0.0 < high else []
+    found = list(fixed)
+    even = np.linspace(low, high, CURVE_PLACES)
+    for x in (*even, *np.quantile(signal, np.linspace(0.0, 1.0, CURVE_PLACES))):
+        if all(abs(x - other) > near for other in found):
+            found.append(float(x))
+    return np.array(sorted(set(found)))
 
 
 @dataclass(frozen=True)
@@ -42,7 +180,8 @@ class Sums:
 
     `inner` is JᵀJ, shape (outputs, places, places), `along` Jᵀ·residual, `power` the residual's sum
     of squares, `frames` their number, `samples` the effective number, `variance` that of the
-    residual in floors². `weights` are those of a frame in the likelihood.
+    residual in floors², `smooth` τ_n/τ_o (`evidence`). `weights` are those of a frame in the
+    likelihood.
     """
 
     inner: Floats
@@ -51,6 +190,7 @@ class Sums:
     frames: Floats
     samples: Floats
     variance: Floats
+    smooth: Floats
     weights: Floats
 
     def of(self, mix: Floats) -> Sums:
@@ -63,7 +203,7 @@ class Sums:
         curved = np.einsum("i,oij,j->o", theta, self.inner, theta)
         left = np.maximum(self.power - 2.0 * self.along @ theta + curved, 0.0)
         square = left / (self.frames * self.variance)
-        return -0.5 * float(self.samples @ misfit(square))
+        return -0.5 * float(self.samples @ misfit(square, self.smooth))
 
     def posterior(self, prior: Floats) -> Posterior:
         """Return values, their covariance, and the log evidence for a prior's precision."""
@@ -75,11 +215,9 @@ class Sums:
         return Posterior(theta, np.linalg.inv(precision), rest, self.likelihood(theta))
 
     def size(self) -> float:
-        """Return the rms of the values of a fit without a prior to speak of."""
+        """Return the rms of the values by least squares, without their priors."""
         inner = np.einsum("o,oij->ij", self.weights, self.inner)
-        ridge = 1e-6 * np.trace(inner) / len(inner)
-        found = np.linalg.solve(inner + ridge * np.eye(len(inner)), self.weights @ self.along)
-        return float(np.sqrt(np.mean(found**2)))
+        return float(np.sqrt(np.mean(_least_squares(inner, self.weights @ self.along) ** 2)))
 
 
 @dataclass(frozen=True)
@@ -110,7 +248,7 @@ class Basis:
     outputs: Sequence[Output]
     columns: Sequence[Floats]
     wanted: Sequence[Floats]
-    variance: Floats
+    error: ModelError
 
     @property
     def free(self) -> NDArray[np.bool_]:
@@ -120,16 +258,12 @@ class Basis:
     @cached_property
     def _scales(self) -> tuple[Floats, Floats]:
         """Autocorrelation time and q of each output's residual with a value at every place."""
-        powers = [float(w @ w) for w in self.wanted]
-        inner = sum(j.T @ j / v for j, v in zip(self.columns, self.variance, strict=True))
-        along = sum(
-            j.T @ w / v for j, w, v in zip(self.columns, self.wanted, self.variance, strict=True)
-        )
-        assert isinstance(inner, np.ndarray) and powers
-        ridge = 1e-6 * np.trace(inner) / len(inner)
-        theta = np.linalg.solve(inner + ridge * np.eye(len(inner)), along)
+        scale = 1.0 / np.sqrt(self.error.variance)
+        columns = np.concatenate([j * s for j, s in zip(self.columns, scale, strict=True)])
+        wanted = np.concatenate([w * s for w, s in zip(self.wanted, scale, strict=True)])
+        theta = _least_squares(columns.T @ columns, columns.T @ wanted)
         lefts = [w - j @ theta for j, w in zip(self.columns, self.wanted, strict=True)]
-        squares = np.array([float(np.mean(left**2)) for left in lefts]) / self.variance
+        squares = np.array([float(np.mean(left**2)) for left in lefts]) / self.error.variance
         return np.array([memory(left) for left in lefts]), squares
 
     def sums(self, part: Part) -> Sums:
@@ -138,14 +272,16 @@ class Basis:
         rows = [output.rows(part) for output in self.outputs]
         some = [(j[at], w[at]) for j, w, at in zip(self.columns, self.wanted, rows, strict=True)]
         frames = np.array([float(at.sum()) for at in rows])
+        whole = np.array([len(at) for at in rows])
         return Sums(
             np.array([j.T @ j for j, _ in some]),
             np.array([j.T @ w for j, w in some]),
             np.array([float(w @ w) for _, w in some]),
             frames,
             frames / memories,
-            self.variance,
-            1.0 / (memories * np.maximum(squares, 1.0) * self.variance),
+            self.error.variance,
+            self.error.smooth(whole / memories),
+            1.0 / (memories * np.maximum(squares, 1.0) * self.error.variance),
         )
 
 
@@ -169,6 +305,12 @@ class Pick:
         half = 1.96 * UNDERSTATED * np.sqrt(np.diag(self.known.covariance))
         found[basis.free[list(self.at)]] = half
         return found
+
+
+def _least_squares(inner: Floats, along: Floats) -> Floats:
+    """Solve normal equations, with a ridge for values that no frame depends on."""
+    ridge = 1e-6 * np.trace(inner) / len(inner)
+    return np.asarray(np.linalg.solve(inner + ridge * np.eye(len(inner)), along))
 
 
 def _mix(basis: Basis, at: Sequence[int]) -> Floats:
@@ -226,9 +368,10 @@ def _lines(basis: Basis) -> list[Floats]:
 
 
 def _grown(basis: Basis, sums: Sums, start: Pick, ends: set[int]) -> Pick:
-    """Return a curve with nodes added one by one, and then taken away, as the evidence grows.
+    """Return the curve of a forward and then backward selection of nodes by the evidence.
 
-    Two nodes that gain only together are found: one may lose evidence if the next gains more.
+    A node that lowers the evidence is kept for one step more, since two nodes together may raise
+    it.
     """
     best = last = start
     while len(last.at) < CURVE_NODES and len(last.at) <= len(best.at) + 1:

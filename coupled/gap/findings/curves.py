@@ -1,15 +1,14 @@
 """Curves: functions of one signal that describe a residual which no effect explains.
 
 A curve is not a cause, and does not change the verdict. Where the credible effects leave a stage
-unexplained, each curve that a rig may have (`curvelaws`) is fitted as a piecewise linear function
-of its signal (`curvefit`), and flown by the stage's own code. The responses to its values are
-finite differences about the last fit (Gauss-Newton). Nodes and values are fitted to every other
-stretch; the others give the share `closed`.
+unexplained, each curve that a rig may have is fitted as a piecewise linear function of its signal
+(`curvefit`). The responses to its values are finite differences (Gauss-Newton) of a replay. Nodes
+and values are fitted to every other stretch; the others give the share `closed`.
 
-The curve with the largest evidence in the whole record is reported if it is bent (a straight line
-is an effect of the library), beats the effects found, closes at least `CURVE_CLOSES` of the gap on
-held-out stretches, and has the same size in all halves of the record. An intermittent or a fading
-fault has not.
+The curve whose linear model has the largest evidence is fitted further, about its last values. It
+is reported if a rig can have it, if it is bent (a straight line is an effect of the library), if
+it has more evidence than the effects found, closes most of the gap on held-out stretches, and has
+the same size in all halves of the record. The curve of an intermittent or fading fault does not.
 """
 
 from __future__ import annotations
@@ -28,35 +27,32 @@ from coupled.gap.chain import stage_of
 from coupled.gap.findings.budget import ChannelShrink, channel_shrink
 from coupled.gap.findings.credibility import Acts, regimes
 from coupled.gap.findings.curvefit import (
+    LAWS,
     Basis,
+    Law,
     Pick,
     Values,
     choose,
     closed_form,
-    straight,
-    with_nodes,
-)
-from coupled.gap.findings.curvelaws import (
-    LAWS,
-    Law,
     filed_curve,
     named,
     places_of,
     rising,
+    straight,
     units_of,
     with_curve,
+    with_nodes,
 )
 from coupled.gap.findings.result import EffectResult
 from coupled.gap.findings.where import signals
 from coupled.gap.noise.smooth import smoothed
 from coupled.gap.search.case import Case
-from coupled.gap.search.evidence import Evidence, evidence, fewest_unexplained, misfit
+from coupled.gap.search.evidence import evidence, evidence_of, fewest_unexplained, misfit
 from coupled.gap.search.found import Choice, Fit
-from coupled.gap.search.problem import Problem
+from coupled.gap.search.problem import ModelError, Problem
 from coupled.gap.signals.output import (
     Output,
     explained_below,
-    memory,
     stage_gaps,
     stage_limits,
 )
@@ -65,12 +61,11 @@ from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points
 from coupled.gap.thresholds import (
     CERTAIN,
-    CURVE_CLOSES,
-    CURVE_DRIFT,
-    CURVE_NEAR,
     CURVE_ROUNDS,
-    CURVE_STEP,
     DRIFT_CHANCE,
+    LESSER,
+    MOST,
+    NEGLIGIBLE,
     RIVAL_GAIN,
 )
 from coupled.parallel import in_threads
@@ -84,7 +79,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Curve:
-    """A function of one signal that takes a residual, and is no cause.
+    """A function of one signal that reproduces a residual; it does not state the cause.
 
     `key` is that of the rig file, `of` and `lists` its keys of the nodes and of the values. `unit`
     is that of the values, `low` and `high` their 95 % intervals. `closed` is the share of the gap
@@ -160,9 +155,9 @@ def find_curves(
         one = _Fitter(case, problem, base, rig, choice.fit, records).best(open_stages)
         if one is None:
             break
-        curve, rig, made = one
-        found.append(curve)
-        half = with_curve(half, case.control, made.law, *made.values) or half
+        found.append(one.curve)
+        rig = one.rig
+        half = with_curve(half, case.control, one.law, *one.fitted) or half
     if not found:
         return None
     closed = tuple(
@@ -181,15 +176,13 @@ def _open_stages(case: Case, choice: Choice, rig: Rig) -> set[str]:
 
 
 @dataclass(frozen=True)
-class _Made:
-    """A curve fitted to the fitted stretches: its nodes and values, its rig, and the fit."""
+class _Found:
+    """A curve: as reported, the rig with it, and the same as fitted to the fitted stretches."""
 
-    law: Law
-    values: Values
+    curve: Curve
     rig: Rig
-    basis: Basis
-    pick: Pick
-    likelihood: float
+    law: Law
+    fitted: Values
 
 
 @dataclass(frozen=True)
@@ -206,51 +199,61 @@ class _Fitter:
     whole: Fit
     records: Sequence[Record]
 
-    def best(self, stages: set[str]) -> tuple[Curve, Rig, _Made] | None:
+    def best(self, stages: set[str]) -> _Found | None:
         """Return the curve of the largest evidence that shows in stages; None if none holds.
 
-        With it are its rig, and the curve that is fitted to the fitted stretches.
+        All laws compete by the evidence of their linear models, also those that no rig can have:
+        their residual follows no other signal. Of laws that the data do not tell apart, the first
+        that a rig can have is fitted: a bend, or beyond the least bend what the force adds to the
+        reading at the grip.
         """
         begun = [one for law in LAWS if (one := self._begun(law, stages)) is not None]
-        gains = [one.likelihood - self._likelihood(one.basis, self.rig) for one in begun]
-        if max(gains, default=0.0) <= 0.0:
+        most = max((self._gain(*one) for one in begun), default=0.0)
+        if most <= 0.0:
             return None
-        near = [
-            self._refined(one)
-            for one, gain in zip(begun, gains, strict=True)
-            if gain > CURVE_NEAR * max(gains)
+        tied = [one for one in begun if self._gain(*one) > most - RIVAL_GAIN]
+        flown = [
+            (*one, rig) for one in tied if (rig := self._with(one[0].law, one[1].values(one[0])))
         ]
-        ends = [end for made in near if (end := self._whole(made)) is not None]
-        if not ends:
+        if not flown:
             return None
-        without = evidence(self.problem, replace(self.base, rig=self.rig), self._variances)
-        by_effects = evidence(self.problem, self.whole, self._variances)
-        known = [self._evidence(rig, without, pick) for _, rig, pick in ends]
-        samples = fewest_unexplained([without, by_effects, *known])
-        logs = [one.log(samples) for one in known]
-        at = int(np.argmax(logs))
-        made, rig, pick = ends[at]
+        gains = [pick.known.rest + self._raised(basis, rig) for basis, pick, rig in flown]
+        first = next(k for k, gain in enumerate(gains) if gain > max(gains) - RIVAL_GAIN)
+        basis, pick, fitted = self._refined(*flown[first])
+        line = straight(basis, basis.sums("fitted"))
+        whole = self._basis(basis.law, basis.places, basis.outputs, pick.values(basis))
+        if whole is None or pick.known.log < line + RIVAL_GAIN:
+            return None
+        last = with_nodes(whole, whole.sums("all"), pick.at)
+        rig = self._with(whole.law, last.values(whole))
+        if rig is None or not self._beats_effects(rig, last):
+            return None
+        curve = self._stated(whole, last, rig, fitted)
+        return None if curve is None else _Found(curve, rig, basis.law, pick.values(basis))
+
+    def _gain(self, basis: Basis, pick: Pick) -> float:
+        """Return the log evidence of a law's linear model, less that without a curve."""
+        return pick.known.log - self._likelihood(basis, self.rig)
+
+    def _raised(self, basis: Basis, rig: Rig) -> float:
+        """Return the log likelihood of a rig, less that without a curve."""
+        return self._likelihood(basis, rig) - self._likelihood(basis, self.rig)
+
+    def _beats_effects(self, rig: Rig, pick: Pick) -> bool:
+        """Tell whether a curve has more evidence than the effects found, and than none."""
+        without = evidence(self.problem, replace(self.base, rig=self.rig), self._error)
+        by_effects = evidence(self.problem, self.whole, self._error)
+        curved = evidence_of(self.problem, rig, self._error, without.rest + pick.known.rest)
+        samples = fewest_unexplained([without, by_effects, curved])
         rivals = without.log(samples), by_effects.log(samples)
-        if logs[at] < max(rivals) + RIVAL_GAIN or not self._bent(made):
-            return None
-        curve = self._stated(made, rig, pick)
-        return None if curve is None else (curve, rig, made)
+        return curved.log(samples) >= max(rivals) + RIVAL_GAIN
 
     @cached_property
-    def _variances(self) -> Floats:
-        return self.problem.variances(self.base.rig)
+    def _error(self) -> ModelError:
+        return self.problem.model_error(self.base.rig)
 
-    def _evidence(self, rig: Rig, without: Evidence, pick: Pick) -> Evidence:
-        """Return the evidence of a curve, from the residuals with it."""
-        lefts = [output.residual(rig) for output in self.problem.outputs]
-        squares = np.array([float(np.mean(left**2)) for left in lefts]) / self._variances
-        if self.case.model_error_in_floors:
-            squares = np.maximum(squares, 1.0)
-        counts = np.array([len(left) / memory(left) for left in lefts])
-        return Evidence(squares, counts, without.rest + pick.known.rest)
-
-    def _begun(self, law: Law, stages: set[str]) -> _Made | None:
-        """Return a law fitted once; None if it cannot be, or shows in none of the stages."""
+    def _begun(self, law: Law, stages: set[str]) -> tuple[Basis, Pick] | None:
+        """Return a law's linear fit; None if it cannot be, or shows in none of the stages."""
         shown = STAGE_OF[law.stage].effects_show_in
         outputs = [
             output
@@ -262,7 +265,8 @@ class _Fitter:
         signal = self._signal(law, outputs)
         if signal is None or filed_curve(self.rig, self.case.control, law).nodes:
             return None
-        return self._fitted(law, places_of(signal, law, self._entries(law)), outputs, None)
+        basis = self._basis(law, places_of(signal, law, self._entries(law)), outputs, None)
+        return None if basis is None else (basis, self._chosen(basis))
 
     def _signal(self, law: Law, outputs: Sequence[Output]) -> Floats | None:
         """Return a law's signal in all of its records; None if one lacks it."""
@@ -291,29 +295,19 @@ class _Fitter:
     def _step(self, law: Law, outputs: Sequence[Output]) -> float:
         """Return a small size of a law's values, in their unit."""
         if law.stage == "surface":
-            return CURVE_STEP
+            return NEGLIGIBLE
         name = f"{self.case.control}_{named(law.scale, self.case.control)}"
         record = self.records[outputs[0].record]
         if name not in record:  # δc
             name = f"{self.case.control}_deflection_{unit_of(self.case.control)}"
-        return CURVE_STEP * float(np.sqrt(np.mean(record[name] ** 2)))
+        return NEGLIGIBLE * float(np.sqrt(np.mean(record[name] ** 2)))
 
     def _with(self, law: Law, values: Values) -> Rig | None:
         return with_curve(self.rig, self.case.control, law, *values)
 
-    def _fitted(
-        self, law: Law, places: Floats, outputs: Sequence[Output], about: Values | None
-    ) -> _Made | None:
-        """Return a law fitted to the fitted stretches, linearised about a curve."""
-        basis = self._basis(law, places, outputs, about)
-        if basis is None:
-            return None
-        pick = choose(basis, basis.sums("fitted"), self._entries(law))
-        values = pick.values(basis)
-        rig = self._with(law, values)
-        if rig is None:
-            return None
-        return _Made(law, values, rig, basis, pick, self._likelihood(basis, rig))
+    def _chosen(self, basis: Basis) -> Pick:
+        """Return the curve of the largest evidence in the fitted stretches."""
+        return choose(basis, basis.sums("fitted"), self._entries(basis.law))
 
     def _basis(
         self, law: Law, places: Floats, outputs: Sequence[Output], about: Values | None
@@ -362,7 +356,7 @@ class _Fitter:
             outputs,
             columns,
             [o.residual(rig) + j @ theta for o, j in zip(outputs, columns, strict=True)],
-            self._variances[index],
+            self._error.of(index),
         )
 
     def _likelihood(self, basis: Basis, rig: Rig) -> float:
@@ -370,47 +364,37 @@ class _Fitter:
         sums = basis.sums("fitted")
         lefts = [output.residual(rig, "fitted") for output in basis.outputs]
         squares = np.array([float(np.mean(left**2)) for left in lefts]) / sums.variance
-        return -0.5 * float(sums.samples @ misfit(squares))
+        return -0.5 * float(sums.samples @ misfit(squares, sums.smooth))
 
-    def _refined(self, made: _Made) -> _Made:
-        """Return a law fitted again about its last curve, while the fit improves."""
+    def _refined(self, basis: Basis, pick: Pick, rig: Rig) -> tuple[Basis, Pick, Rig]:
+        """Return a law fitted again about its last curve, while the fit improves, and its rig."""
         for _ in range(CURVE_ROUNDS):
-            anew = self._fitted(made.law, made.basis.places, made.basis.outputs, made.values)
-            if anew is None:
+            again = self._basis(basis.law, basis.places, basis.outputs, pick.values(basis))
+            if again is None:
                 break
-            gain = anew.likelihood - self._likelihood(anew.basis, made.rig)
+            next_pick = self._chosen(again)
+            changed = self._with(again.law, next_pick.values(again))
+            if changed is None:
+                break
+            gain = self._likelihood(again, changed) - self._likelihood(again, rig)
             if gain < 0.0:
                 break
-            made = anew
+            basis, pick, rig = again, next_pick, changed
             if gain < 1.0:
                 break
-        return made
+        return basis, pick, rig
 
-    def _whole(self, made: _Made) -> tuple[_Made, Rig, Pick] | None:
-        """Return a curve's values from all stretches, with their rig."""
-        basis = self._basis(made.law, made.basis.places, made.basis.outputs, made.values)
-        if basis is None:
-            return None
-        pick = with_nodes(basis, basis.sums("all"), made.pick.at)
-        rig = self._with(made.law, pick.values(basis))
-        return None if rig is None else (replace(made, basis=basis), rig, pick)
-
-    def _bent(self, made: _Made) -> bool:
-        """Tell whether a curve has more evidence than a straight line."""
-        line = straight(made.basis, made.basis.sums("fitted"))
-        return made.pick.known.log > line + RIVAL_GAIN
-
-    def _stated(self, made: _Made, rig: Rig, pick: Pick) -> Curve | None:
-        """Return a curve with its tests; None if it fails one."""
-        outputs, law = made.basis.outputs, made.law
+    def _stated(self, basis: Basis, pick: Pick, rig: Rig, fitted: Rig) -> Curve | None:
+        """Return the curve for the report; None if it is not held out, or not stationary."""
+        outputs, law = basis.outputs, basis.law
         widest = max(outputs, key=lambda output: output.gap(self.rig))
-        held = channel_shrink(widest, self.rig, made.rig, 1.0, improved=True)
+        held = channel_shrink(widest, self.rig, fitted, 1.0, improved=True)
         if held.closed is None or held.low is None or held.high is None:
             return None
-        if held.low < CURVE_CLOSES or self._drift(rig, outputs) > CURVE_DRIFT:
+        if held.low < MOST or self._drift(rig, outputs) > LESSER:
             return None
-        nodes, _ = pick.values(made.basis)
-        errors = pick.errors(made.basis)
+        nodes, _ = pick.values(basis)
+        errors = pick.errors(basis)
         of, lists, unit = units_of(self.rig, self.case.control, law)
         shown = filed_curve(rig, self.case.control, law).at(nodes)
         return Curve(
@@ -425,14 +409,14 @@ class _Fitter:
             closed=held.closed,
             closed_low=held.low,
             closed_high=held.high,
-            like=closed_form(made.basis, pick, self._entries(law), self._of_two_signals(made)),
+            like=closed_form(basis, pick, self._entries(law), self._of_two_signals(basis)),
             lists=lists,
         )
 
-    def _of_two_signals(self, made: _Made) -> dict[str, list[Floats]]:
+    def _of_two_signals(self, basis: Basis) -> dict[str, list[Floats]]:
         """Return the responses to a force in proportion to δ·|v|, by name; none of other stages."""
-        outputs, control = made.basis.outputs, self.case.control
-        if made.law.stage != "loader":
+        outputs, control = basis.outputs, self.case.control
+        if basis.law.stage != "loader":
             return {}
         found = []
         for output in outputs:
@@ -440,7 +424,7 @@ class _Fitter:
             known = signals(output, output.residual(self.rig), record, control, "loader")
             d = unit_of(control)
             force = known[f"computed_{d}"] * np.abs(known[f"computed_rate_{d}_per_s"])
-            size = self._step(made.law, outputs) / float(np.sqrt(np.mean(force**2)))
+            size = self._step(basis.law, outputs) / float(np.sqrt(np.mean(force**2)))
             found.append(response_to_force(self.rig, control, record, output, size * force))
         return {"c·δ·|v|": found}
 

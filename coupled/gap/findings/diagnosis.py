@@ -83,7 +83,6 @@ class Diagnosis(Findings, TableResult):
     left_out: tuple[str, ...] = ()
     # Parameters of the effects found that the records determine only together.
     inseparable: tuple[Alike, ...] = ()
-    # The curves beside the effects that are credible; None if there are none.
     # What of the trim comes from the records or their manifests, in words; empty if nothing.
     trim: str = ""
 

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from coupled.display import percent
 from coupled.errors import InputError
+from coupled.flight.gusts import DRAWN, GivenAir
 from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import Manoeuvre, PressureProfile
 from coupled.flight.pilot import Action, Pilot
@@ -26,7 +27,8 @@ from coupled.gap.effects.library import BY_NAME
 from coupled.gap.findings.budget import shapley_subsets
 from coupled.gap.findings.result import labelled
 from coupled.gap.noise.smooth import smoothed
-from coupled.gap.signals.air import vertical_air
+from coupled.gap.signals.drives import drifts, softest_gradient
+from coupled.gap.stages.airframe import gusts_of, has_gusts
 from coupled.gap.stages.surfaces import surface_channel
 from coupled.gap.thresholds import NEGLIGIBLE, SHORT_FRAMES
 from coupled.record.channels import ControlName, channel
@@ -84,12 +86,12 @@ def fly_force(
     rig: Rig,
     forces_N: Mapping[ControlName, Floats],
     pressure_Pa: Floats | None = None,
-    air_m_per_s: Floats | None = None,
+    air: GivenAir = DRAWN,
     seed: int = 0,
 ) -> Record:
     """Return the record of a rig under forces given at each frame, shape (frames,) each.
 
-    `pressure_Pa` is the q̄ of a bench, `air_m_per_s` the vertical speed of the air, both by frame.
+    `pressure_Pa` is the q̄ of a bench by frame, `air` the motion of the air.
     """
     frames = len(next(iter(forces_N.values())))
     times = np.arange(frames) / rig.frame_rate
@@ -105,8 +107,7 @@ def fly_force(
     again = Manoeuvre(
         rig, pilots, frames / rig.frame_rate, seed=seed, bench=bench, name="flown-again"
     )
-    air = None if air_m_per_s is None else air_m_per_s[1:].tolist()
-    return fly(again, air_m_per_s=air)
+    return fly(again, air=air)
 
 
 @dataclass
@@ -117,6 +118,7 @@ class Again:
     """
 
     record: Record
+    nominal: Rig
     pulled: Mapping[ControlName, Floats]
     pressure: Floats | None
     _flown: list[tuple[Rig, Record | None]] = field(default_factory=list, repr=False)
@@ -130,7 +132,9 @@ class Again:
         lacks_pressure = nominal.flight is None and pressure not in record
         if not pulled or not pulled.keys() >= {*controls} or lacks_pressure:
             return None
-        return cls(record, pulled, smoothed(record[pressure]) if pressure in record else None)
+        return cls(
+            record, nominal, pulled, smoothed(record[pressure]) if pressure in record else None
+        )
 
     def fly(self, rig: Rig) -> Record | None:
         """Return a rig's flight without noise; None if it cannot be flown."""
@@ -138,11 +142,13 @@ class Again:
         for known, flown in self._flown:
             if known == quiet:
                 return flown
-        gusts = rig.flight is not None and rig.flight.gust_rms > 0.0
-        air = vertical_air(self.record, 1.0 / rig.frame_rate) if gusts else None
+        air = DRAWN
+        if rig.flight is not None and has_gusts(rig.flight):
+            model = gusts_of(self.nominal, self.record)
+            air = DRAWN if model is None else model.air(rig.flight)
         made: Record | None
         try:
-            made = fly_force(quiet, self.pulled, self.pressure, None if air is None else air.speed)
+            made = fly_force(quiet, self.pulled, self.pressure, air)
         except InputError:
             made = None
         self._flown.append((quiet, made))
@@ -157,10 +163,15 @@ def closed_loop(
 ) -> tuple[ChannelAgain, ...] | None:
     """Return the RMS differences from the record of both rigs, flown with the controls' forces.
 
-    None without a simulation, if a control is not moved by force, or if a rig cannot be flown.
+    None without a simulation, if a control is not moved by force, or if a rig cannot be flown. A
+    bench without a spring is not flown: its motion would drift with any error of the force.
     """
     by_force = nominal.controls and all(nominal.controls[c].drive == "force" for c in controls)
     if again is None or not by_force:
+        return None
+    if nominal.flight is None and any(
+        drifts(nominal, c, softest_gradient(nominal, c, again.record)) for c in controls
+    ):
         return None
     names = [channel(control, quantity) for control in controls for quantity in COMPARED]
     motion = [*map(surface_channel, controls), *MOTION, *LATERAL]

@@ -5,8 +5,9 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 from coupled.display import System, in_system, split_unit, unit_in
 from coupled.gap.effects.airframe import TERM
@@ -402,6 +403,25 @@ def change(p: ParameterEstimate) -> str:
     by = f"{100 * (p.value - 1.0):+.3g} %" if p.relative else sign + figure(more)
     more_does = " or more" if p.at_least else ""
     return f"{figure(p.filed)} → {figure(p.found)}{unit}{more_does} ({by})"
+
+
+def changed(
+    effects: Iterable[EffectResult], fitted_again: Mapping[tuple[str, ...], Any]
+) -> list[str]:
+    """Return each parameter's key and change.
+
+    `fitted_again` are values of a rig fitted without the other effects, by the parts of their keys.
+    They replace those found.
+    """
+    now = {f".{'.'.join(parts)}": value for parts, value in fitted_again.items()}
+    lines = []
+    for effect in effects:
+        for p in effect.parameters:
+            key = effect.key_of(p)
+            ends = [value for at, value in now.items() if at.endswith(f".{key}")]
+            stated = replace(p, found=ends[0], relative=False) if ends else p
+            lines.append(f"{key} {change(stated)}")
+    return lines
 
 
 def in_units(parameter: ParameterEstimate, system: System) -> ParameterEstimate:

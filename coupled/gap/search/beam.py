@@ -29,7 +29,7 @@ from coupled.gap.search.case import Case
 from coupled.gap.search.descent import Descent
 from coupled.gap.search.evidence import Evidence, evidence, fewest_unexplained
 from coupled.gap.search.found import Candidate, Choice, Fit, Found
-from coupled.gap.search.problem import EXACT, Problem
+from coupled.gap.search.problem import EXACT, ModelError, Problem
 from coupled.gap.search.screen import Screen, Screened, Worth
 from coupled.gap.signals.output import explained_below, stage_gaps, stage_limits
 from coupled.gap.thresholds import (
@@ -39,6 +39,7 @@ from coupled.gap.thresholds import (
     GIVEN_UP,
     MINOR,
     MORE,
+    MOST,
     PRIOR_EFFECT,
     RIVAL_GAIN,
     SHOOTINGS,
@@ -82,14 +83,14 @@ class Beam:
     """The sets fitted so far, by their effects' names, and the terms of their evidence.
 
     `without_effects` is the fit of the nuisance parameters alone, within their tolerance.
-    `variance` is that of each output's residual, noise floors², `counts` its effective samples.
+    `error` is the model error of each output, `counts` its residual's effective samples.
     `finished` are the sets fitted at the loader's own steps. `contact` holds the presliding
     parameters of dry friction from the last fit that estimated them.
     """
 
     problem: Problem
     without_effects: Fit
-    variance: Floats
+    error: ModelError
     counts: Floats = field(default_factory=lambda: np.zeros(0))
     fits: dict[Names, Fit] = field(default_factory=dict)
     known: dict[Names, Evidence] = field(default_factory=dict)
@@ -99,12 +100,12 @@ class Beam:
 
     def __post_init__(self) -> None:
         """Make the screen of candidates, which caches their signatures."""
-        self.screen = Screen(self.problem, self.variance)
+        self.screen = Screen(self.problem, self.error)
 
     def add(self, fitted: Fit) -> None:
         """Add a fit; of two fits of a set keep the admissible one, then that of higher evidence."""
         names = names_of(fitted.effects)
-        new = evidence(self.problem, fitted, self.variance)
+        new = evidence(self.problem, fitted, self.error)
 
         def rank(fit: Fit, known: Evidence) -> tuple[bool, float]:
             return is_admissible(self.problem, fit), known.log(self.counts)
@@ -171,15 +172,23 @@ class Beam:
         self.counts = fewest_unexplained([self.known[names] for names in self.valid()])
         self.best = self.ranked()[0]
 
-    def worth(self, names: Names) -> Worth:
+    def worth(self, fitted: Fit, share: float = 1.0) -> Worth:
         """Return the predicted gain that one effect more needs to make a set the best one.
 
-        The gain must exceed the log prior of an effect and the evidence by which the set is behind
-        the best one. The nuisance parameters' prior penalty is deducted: the effect may remove it.
+        The gain must exceed the log prior of an effect and a `share` of the evidence by which the
+        set is behind the best one: a prediction may show half of a gain. The nuisance parameters'
+        prior penalty is deducted: the effect may remove it.
         """
-        relief = sum(group.penalty for group in self.fits[names].groups.values())
-        behind = self.log(self.best) - self.log(names) if names else 0.0
-        return Worth(PRIOR_EFFECT + behind - relief, self.counts)
+        relief = sum(group.penalty for group in fitted.groups.values())
+        return Worth(PRIOR_EFFECT + share * self.behind(fitted) - relief, self.counts)
+
+    def log_of(self, fitted: Fit) -> float:
+        """Return the log evidence of a fit, possibly not of this beam."""
+        return evidence(self.problem, fitted, self.error).log(self.counts)
+
+    def behind(self, fitted: Fit) -> float:
+        """Return the log evidence by which a fit, possibly not of this beam, is behind the best."""
+        return max(self.log(self.best) - self.log_of(fitted), 0.0)
 
     def open_outputs(self, names: Names) -> set[str]:
         """Return the outputs whose residual exceeds the noise and the model error with a set."""
@@ -242,7 +251,7 @@ def _search_from(
     Return the beam, and the gains of each depth (`_search_by_depth`).
     """
     without_effects, case = problem.within_tolerance(known[0]), problem.case
-    beam = Beam(problem, without_effects, problem.variances(without_effects.rig))
+    beam = Beam(problem, without_effects, problem.model_error(without_effects.rig))
     for fitted in known:
         beam.add(fitted)
     beam.recount()
@@ -291,12 +300,13 @@ def _search_by_depth(beam: Beam, library: Sequence[Effect]) -> tuple[dict[str, f
 def _fit_neighbours_of_best(beam: Beam, library: Sequence[Effect]) -> None:
     """Fit the sets with one effect less than the best set, and with a nested law in its place.
 
-    A law of several parameters may be equivalent to two effects of fewer parameters, so these sets
-    are fitted as well. Repeat while the best set changes.
+    A set with one effect less starts at the optimum of the best set, also if it is known: its first
+    fit may have ended at a local minimum. A law of several parameters may be equivalent to two
+    effects of fewer parameters, so they are fitted as well. Repeat while the best set changes.
     """
     while beam.best:
         best, fitted = beam.best, beam.fits[beam.best]
-        fewer = [one for one in _sets_without_one(fitted) if names_of(one[0]) not in beam.fits]
+        fewer = [one for one in _sets_without_one(fitted) if one[0]]
         swapped = _sets_with_swap(beam, fitted, library)
         _fit_sets(beam, [*fewer, *swapped, *_sets_with_other_law(beam, fitted, library)])
         for law in fitted.effects:
@@ -362,28 +372,31 @@ def _fit_with_simpler_law(beam: Beam, law: Effect) -> Fit | None:
 def _fit_neighbours(beam: Beam, fitted: Fit, library: Sequence[Effect], wanted: set[str]) -> None:
     """Fit the neighbours of a fitted set, with effects that show in the `wanted` outputs.
 
-    A law that contains another law is fitted after it, from its optimum. Laws of dry friction start
-    from presliding parameters that were fitted before. Effects are screened with the nuisance
-    parameters within their tolerance: beyond it they may have absorbed an effect.
+    The candidate of the largest predicted gain is fitted first, and the others only if they may do
+    better. A law that contains another law is fitted after it, from its optimum, if the best set
+    leaves an output unexplained. Laws of dry friction start from presliding parameters that were
+    fitted before. Effects are screened with the nuisance parameters within their tolerance: beyond
+    it they may have absorbed an effect.
     """
     is_best, fitted = names_of(fitted.effects) == beam.best, beam.problem.within_tolerance(fitted)
+    beside, worth = _candidates(fitted.effects, library, wanted), beam.worth(fitted)
     many = BEAM_CANDIDATES if is_best else TRIES
-    beside, worth = (
-        _candidates(fitted.effects, library, wanted),
-        beam.worth(names_of(fitted.effects)),
-    )
     screened = beam.screen.best(fitted, beside, worth, many, anew=is_best)
     if not screened and is_best and (pair := beam.screen.pair(fitted, beside, worth)):
         _fit_sets(beam, _starts_with_two_more(fitted, *pair))
     effects = [one.effect for one in screened]
     plain = [one for one in screened if not any(contains(one.effect, e) for e in effects)]
-    dry = next((one for one in plain if one.effect.dry), None)
-    if dry is not None and not beam.contact:
-        ends = _fit_sets(beam, _starts_with_one_more(fitted, dry, {}))
-        beam.contact = _contact_values(beam, ends[0]) if ends else {}
-    ends = _fit_sets(
-        beam, [t for one in plain for t in _starts_with_one_more(fitted, one, beam.contact)]
-    )
+    ends = list[Fit]()
+    for some in (plain[:1], plain[1:]):
+        still = beam.screen.still_worth(fitted, some, beam.worth(fitted, MOST))
+        dry = next((one for one in still if one.effect.dry), None)
+        if dry is not None and not beam.contact:
+            first = _fit_sets(beam, _starts_with_one_more(fitted, dry, {}))
+            beam.contact = _contact_values(beam, first[0]) if first else {}
+        tries = [t for one in still for t in _starts_with_one_more(fitted, one, beam.contact)]
+        ends += _fit_sets(beam, tries)
+    if beam.best and not beam.open_outputs(beam.best):
+        return
     wider = [one for one in screened if one not in plain]
     others = [t for one in wider for t in _starts_with_one_more(fitted, one, beam.contact)]
     for end in ends:
@@ -468,7 +481,7 @@ def _sets_with_swap(beam: Beam, fitted: Fit, library: Sequence[Effect]) -> list[
         ]
         if rig is not None and same:
             base = replace(fitted, effects=rest, rig=rig)
-            found = beam.screen.best(base, same, beam.worth(beam.best), TRIES)
+            found = beam.screen.best(base, same, beam.worth(base, MOST), TRIES)
             tries += [
                 t for one in found for t in _starts_with_one_more(base, one, beam.contact)[:1]
             ]
@@ -519,8 +532,10 @@ def _starts_with_other_law(beam: Beam, fitted: Fit, old: Effect, law: Effect) ->
 def _fit_sets(beam: Beam, tries: Sequence[Try]) -> list[Fit]:
     """Fit sets from their starts, add them, and return the best fit of each set.
 
-    All starts are fitted for a few evaluations. The best start of each set is then fitted to
-    convergence; a further start only if the best one leaves an output over its limit.
+    All starts are fitted for a few evaluations, which need not reach the optimum. A start goes on
+    if it is near the best one, or made at least half of its gain over the parent. The best start of
+    each set is then fitted to convergence; a further start only if the best one leaves an output
+    over its limit.
     """
     problem = beam.problem
     unique: dict[tuple[Names, tuple[tuple[str, float], ...]], Try] = {}
@@ -533,11 +548,13 @@ def _fit_sets(beam: Beam, tries: Sequence[Try]) -> list[Fit]:
     def start_fit(one: Try) -> Started:
         effects, start, parent = one
         fit = problem.fit(effects, start, parent, FIRST)
-        return evidence(problem, fit, beam.variance).log(beam.counts), fit, parent
+        return beam.log_of(fit), fit, parent
 
     started = sorted(in_threads(start_fit, list(unique.values())), key=lambda one: -one[0])
     most = max(started[0][0], beam.log(beam.best))
-    going = [one for one in started if one[0] > most - (4.0 * GIVEN_UP)]
+    going = [
+        one for one in started if one[0] > most - max(GIVEN_UP, MOST * (most - beam.log_of(one[2])))
+    ]
     first: dict[Names, Started] = {}
     for one in going:
         first.setdefault(names_of(one[1].effects), one)
@@ -603,12 +620,19 @@ def _choose(beam: Beam, rounds: tuple[dict[str, float], ...]) -> Choice:
     """Return the best set with each effect's posterior probability and its alternatives.
 
     The probability of an effect is the sum over the sets with it, or with a law that contains it.
+    If no set has more than half of the probability, the first whose sizes are determined stands for
+    them.
     """
-    ranked, best = beam.ranked(), beam.best
-    fitted = beam.fits[best]
+    ranked = beam.ranked()
     logs = np.array([beam.log(names) for names in ranked])
     weights = np.exp(logs - logs[0])
     weights /= weights.sum()
+    best = beam.best
+    if weights[0] <= MOST:
+        near = [names for names in ranked if beam.log(names) > logs[0] - RIVAL_GAIN]
+        sure = (names for names in near if names and is_admissible(beam.problem, beam.fits[names]))
+        best = next(sure, best)
+    fitted = beam.fits[best]
     steps = []
     for effect in fitted.effects:
         held = [
@@ -628,7 +652,14 @@ def _choose(beam: Beam, rounds: tuple[dict[str, float], ...]) -> Choice:
     base = beam.log(frozenset())
     tried = {next(iter(names)): beam.log(names) - base for names in beam.fits if len(names) == 1}
     steps.sort(key=lambda step: -step.gain)
-    return Choice(tuple(steps), fitted, beam.without_effects, tried, rounds, float(weights[0]))
+    return Choice(
+        tuple(steps),
+        fitted,
+        beam.without_effects,
+        tried,
+        rounds,
+        float(weights[ranked.index(best)]),
+    )
 
 
 def _replaces(best: Names, other: Names, effect: Effect) -> bool:

@@ -4,14 +4,16 @@ For a set E of effects with parameters θ, nuisance parameters φ, and outputs o
 
     ln Z(E) = Σ_o L_o + ln P(E) + ln p(φ̂) − ½·ln det(I + S·H·S)
 
-    L_o  = −N_o/(2·τ_o)·m(q_o)        log-likelihood with N_o/τ_o effective samples
+    L_o  = −½·N_o·m(q_o)              log-likelihood
     q_o  = mean(r_o²)/v_o             r_o: residual over the noise floor, at the fitted parameters
-    m(q) = ln q where q > 1           the residual's own variance is estimated: noise or misfit
-           q − 1 elsewhere            the residual cannot be smaller than the known noise
-    v_o  = 1 + (ε·(g_o − 1))²         model error: a share ε of the residual without effects, g_o
+    m(q) = ln q/τ_n where q > 1       the residual's own variance is estimated: noise or misfit
+           (q − 1)/τ_o elsewhere      the residual cannot be smaller than the known noise
+    τ_o  = (τ_n + e_o·τ_g)/v_o        autocorrelation time of noise and model error together
+    v_o  = 1 + e_o                    variance of noise and model error
+    e_o  = (ε·(g_o − 1))²             model error: a share ε of the residual without effects, g_o
     ln P(E) = −Σ_effects (A + B·(parameters − 1))
     p(φ)    the Gaussian priors of the nuisance parameters, relative to their maximum
-    H = Σ_o J_oᵀJ_o/(τ_o·max(q_o, 1))  information matrix of the log-likelihood
+    H = Σ_o J_oᵀJ_o/(τ_n·max(q_o, 1))  information matrix of the log-likelihood
     S = diag(s)                       prior widths, so that s·√(2π) is 1/(prior density at the fit)
 
 If the noise floor includes the model error of the healthy machine, a residual below it is no
@@ -22,9 +24,11 @@ size is uniform in its logarithm over Λ = ln 10⁴, so s = |θ̂ − θ₀|·Λ
 θ₀; the size is taken as at least its standard error. The evidence is then independent of the unit.
 The prior of a nuisance parameter is Gaussian, or uniform between its bounds.
 
-τ_o is the integrated autocorrelation time (`memory`) of the smallest residual of output o in any
+τ_n is the integrated autocorrelation time (`memory`) of the smallest residual of output o in any
 set. It is the same for all sets, so that the longer correlation of a worse residual does not reduce
-its weight.
+its weight. τ_g is that of the residual without effects: the model error is a share of it, and is as
+smooth. A difference of two sets that is smaller than the model error is then little evidence,
+however long the record.
 
 MacKay, Information Theory, Inference, and Learning Algorithms (2003), ch. 28, has the theory.
 """
@@ -40,53 +44,64 @@ from numpy.typing import NDArray
 
 from coupled.gap.effects.effect import Effect, Parameter
 from coupled.gap.search.found import Fit, Group
-from coupled.gap.search.problem import Problem
+from coupled.gap.search.problem import ModelError, Problem
 from coupled.gap.signals.output import Output, memory
 from coupled.gap.thresholds import PRIOR_EFFECT, PRIOR_NUMBER, PRIOR_SPAN
+from coupled.rig.rig import Rig
 
 Floats = NDArray[np.float64]
 
 
-def misfit(square: Floats) -> Floats:
-    """Return −2 log-likelihood per sample of residuals of given mean square, less that of 1."""
-    return np.where(square > 1.0, np.log(np.maximum(square, 1.0)), square - 1.0)
+def misfit(square: Floats, smooth: Floats | float = 1.0) -> Floats:
+    """Return −2 log-likelihood per sample of residuals of given mean square, less that of 1.
+
+    It is τ_n·m(q); `smooth` is τ_n/τ_o.
+    """
+    return np.where(square > 1.0, np.log(np.maximum(square, 1.0)), smooth * (square - 1.0))
 
 
 @dataclass(frozen=True)
 class Evidence:
     """The terms of a set's evidence: `rest` is the sum of all terms except Σ L_o.
 
-    `squares` are q_o, `samples` N_o/τ_o from the set's own residuals, shape (outputs,).
+    `squares` are q_o, `samples` N_o/τ_n from the set's own residuals, shape (outputs,).
     """
 
     squares: Floats
     samples: Floats
     rest: float
+    error: ModelError
 
     def log(self, samples: Floats) -> float:
         """Return ln Z with given effective samples of each output, shape (outputs,)."""
-        return self.rest - 0.5 * float(samples @ misfit(self.squares))
+        misfits = misfit(self.squares, self.error.smooth(samples))
+        return self.rest - 0.5 * float(samples @ misfits)
 
 
 def fewest_unexplained(known: Sequence[Evidence]) -> Floats:
-    """Return N_o/τ_o from the smallest residual of each output o, shape (outputs,)."""
+    """Return N_o/τ_n from the smallest residual of each output o, shape (outputs,)."""
     squares = np.array([one.squares for one in known])
     counts = np.array([one.samples for one in known])
     return np.asarray(counts[np.argmin(squares, axis=0), np.arange(squares.shape[1])])
 
 
-def evidence(problem: Problem, fitted: Fit, variance: Floats) -> Evidence:
-    """Return the evidence of the set of a fit; `variance` is v_o, shape (outputs,)."""
-    lefts = [output.residual(fitted.rig) for output in problem.outputs]
-    squares = np.array([float(np.mean(left**2)) for left in lefts]) / variance
-    if problem.case.model_error_in_floors:
-        squares = np.maximum(squares, 1.0)
-    counts = np.array([len(left) / memory(left) for left in lefts])
+def evidence(problem: Problem, fitted: Fit, error: ModelError) -> Evidence:
+    """Return the evidence of the set of a fit."""
     rest = sum(
         _laplace(problem, members, group) - group.penalty
         for members, group in fitted.groups.items()
     )
-    return Evidence(squares, counts, rest + sum(map(log_prior, fitted.effects)))
+    return evidence_of(problem, fitted.rig, error, rest + sum(map(log_prior, fitted.effects)))
+
+
+def evidence_of(problem: Problem, rig: Rig, error: ModelError, rest: float) -> Evidence:
+    """Return the evidence of a rig, with all terms but the log-likelihood in `rest`."""
+    lefts = [output.residual(rig) for output in problem.outputs]
+    squares = np.array([float(np.mean(left**2)) for left in lefts]) / error.variance
+    if problem.case.model_error_in_floors:
+        squares = np.maximum(squares, 1.0)
+    samples = np.array([len(left) / memory(left) for left in lefts])
+    return Evidence(squares, samples, rest, error)
 
 
 def log_prior(effect: Effect) -> float:

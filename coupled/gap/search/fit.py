@@ -34,8 +34,8 @@ from coupled.gap.search.case import Case
 from coupled.gap.search.descent import WHOLE, Descent, End, Slope
 from coupled.gap.search.found import Fit, Group
 from coupled.gap.search.intervals import cost_of_unit_likelihood, half_width, least_of, open_above
-from coupled.gap.signals.output import Output, Part, memory
-from coupled.gap.thresholds import DOUBLED, FAR, ROUNDS, TINY
+from coupled.gap.signals.output import TRIM, Output, Part, memory
+from coupled.gap.thresholds import DOUBLED, FAR, ROUNDS, TINY, TRIM_SIGMAS
 from coupled.parallel import go_on
 from coupled.record.channels import ControlName
 from coupled.rig.rig import Rig
@@ -207,11 +207,7 @@ def _fit(
         return np.concatenate((residual(scaled, coarse, rough), prior.rows(scaled)))
 
     rows = np.repeat(weights, frames)
-    before, held = descent.slopes.get(tuple(keys)), descent.held
-    slope = None if before is None else prior.in_slope(before, rows)
-    if held is not None:
-        held = np.vstack((rows[:, None] * held, prior.slopes))
-    search = replace(descent, dry=dry, held=held)
+    search, slope = _with_slopes(descent, keys, prior, rows, dry)
     best = prior.without(search.end(with_prior, firsts, (low, high), stepped, slope=slope))
 
     def cost(at: float, k: int) -> float:
@@ -226,14 +222,37 @@ def _fit(
             found = search.end(with_prior, [edge], (low, high), stepped)
             best = min(best, prior.without(found), key=lambda one: one.cost)
     free = _Free(keys, frees, scale, ends, weights, frames)
+    there = _with_trim(best, free, ours) if descent.most == WHOLE.most else None
+    if there is not None:
+        found = search.end(with_prior, [np.clip(there, low, high)], (low, high), stepped)
+        best = min(best, prior.without(found), key=lambda one: one.cost)
     changed = _changed(squares, best, free, ours)
     if legs > 1 and descent.steps != "coarse" and changed > DOUBLED:
         again = dict(zip(keys, (best.x * scale).tolist(), strict=True))
         rest = replace(descent, slopes={})
         return _fit(case, ours, effects, priors, again, rest, part, legs - 1)
-    best = replace(best, slope=None if held is not None else _plain(best.slope, rows))
+    best = replace(best, slope=None if search.held is not None else _plain(best.slope, rows))
     number = [1000 * output.record + output.stretches[output.rows(part)] for output in ours]
-    return _group(case, np.concatenate(number), free, best, prior, cost)
+    errors = _errors(ours, weights, part)
+    return _group(case, np.concatenate(number), free, best, prior, cost, errors)
+
+
+def _errors(outputs: Sequence[Output], weights: Sequence[float], part: Part) -> Floats:
+    """Return samples of the inputs' error in the weighted residuals, shape (samples, rows)."""
+    samples = max(len(output.errors) for output in outputs)
+    return np.array(
+        [
+            np.concatenate(
+                [
+                    weight / one.floor * one.errors[k][one.rows(part)]
+                    if k < len(one.errors)
+                    else np.zeros(np.count_nonzero(one.rows(part)))
+                    for one, weight in zip(outputs, weights, strict=True)
+                ]
+            )
+            for k in range(samples)
+        ]
+    )
 
 
 class Cost(Protocol):
@@ -271,14 +290,16 @@ def _group(
     best: End,
     prior: _Priors,
     cost: Cost,
+    errors: Floats,
 ) -> Group:
     """Return the values of a converged fit, with their intervals, and which are at a bound.
 
-    `stretches` is the stretch number of each row, `cost` the cost with one parameter changed.
+    `stretches` is the stretch number of each row, `cost` the cost with one parameter changed,
+    `errors` samples of the inputs' error, shape (samples, rows).
     """
     (low, high), scale = free.ends / free.scale, free.scale
     outputs = len(free.frames)
-    half = half_width(best, outputs, stretches, prior.precision) * scale
+    half = half_width(best, outputs, stretches, prior.precision, errors) * scale
     # A lower bound at which nothing is left of the filed value is a valid result, not a bound.
     gone = np.isclose(best.x, low, atol=1e-4) & (free.ends[0] < [p.low for p in free.numbers])
     values = best.x * scale
@@ -325,6 +346,40 @@ def _squares(outputs: Sequence[Output], lefts: Sequence[Floats]) -> list[float]:
         same = [left for left, other in zip(lefts, channels, strict=True) if other == channel]
         found.append(max(float(np.mean(np.concatenate(same) ** 2)), 1.0))
     return found
+
+
+def _with_slopes(
+    descent: Descent, keys: Sequence[str], prior: _Priors, rows: Floats, dry: bool
+) -> tuple[Descent, Slope | None]:
+    """Return the options of a fit with priors, and the Jacobian of a fit that ended at its start.
+
+    `rows` are the weights of the residual's rows.
+    """
+    before, held = descent.slopes.get(tuple(keys)), descent.held
+    slope = None if before is None else prior.in_slope(before, rows)
+    if held is not None:
+        held = np.vstack((rows[:, None] * held, prior.slopes))
+    return replace(descent, dry=dry, held=held), slope
+
+
+def _with_trim(end: End, free: _Free, outputs: Sequence[Output]) -> Floats | None:
+    """Return the parameters with which the model trims as the records do; None if it does.
+
+    Beyond the trim's error a flight is moved to the model's own trim (`openloop`), and the cost has
+    another minimum there. Of all parameters with the record's trim, to first order, these increase
+    the cost least.
+    """
+    each = zip(free.parts(), outputs, strict=True)
+    trims = [rows for (rows, _), output in each if output.channel == TRIM]
+    if not trims:
+        return None
+    left = np.concatenate([end.fun[rows] for rows in trims])
+    slope = np.concatenate([end.jac[rows] for rows in trims]).mean(axis=0)
+    toward = np.linalg.pinv(end.jac.T @ end.jac) @ slope
+    reach = float(slope @ toward)
+    if abs(left.mean()) * math.sqrt(len(left)) <= TRIM_SIGMAS or reach <= 0.0:
+        return None
+    return np.asarray(end.x - toward * left.mean() / reach)
 
 
 def _changed(squares: Sequence[float], end: End, free: _Free, outputs: Sequence[Output]) -> float:

@@ -1,9 +1,12 @@
-"""Confidence intervals of fitted parameters: the wider of two 95 % intervals.
+"""Confidence intervals of fitted parameters: the widest of three 95 % intervals.
 
 The first assumes a stationary residual with a correlation time. The second is the sandwich
 estimator from the scatter of the score between stretches (White, Econometrica 48, 1980); it
 includes misfit, and needs more stretches than parameters. The stretches of a short record are
 therefore divided into parts much longer than the residual's correlation time (`memory`).
+
+Neither sees an error of the input that lasts: the fit takes it for the parameters' effect. The
+third is the scatter of the estimates (JᵀJ)⁻¹·Jᵀ·e of samples e of the input's propagated error.
 """
 
 from __future__ import annotations
@@ -22,11 +25,12 @@ Floats = NDArray[np.float64]
 Numbers = NDArray[np.intp]
 
 
-def half_width(found: End, outputs: int, groups: Numbers, known: Floats) -> Floats:
+def half_width(found: End, outputs: int, groups: Numbers, known: Floats, errors: Floats) -> Floats:
     """Return half of each scaled parameter's 95 % interval; infinite if it is undetermined.
 
-    The larger of two: from the residual's variance and correlation time, and from the sandwich
-    estimator. `groups` are the stretch numbers of the rows, `known` the 1/variance of the priors.
+    The largest of three: from the residual's variance and correlation time, from the sandwich
+    estimator, and from samples of the input's error, `errors`, shape (samples, rows). `groups` are
+    the stretch numbers of the rows, `known` the 1/variance of the priors.
     """
     jacobian, left = found.jac, found.fun
     variance, widen = _counted(left, outputs)
@@ -42,6 +46,9 @@ def half_width(found: End, outputs: int, groups: Numbers, known: Floats) -> Floa
     filled = bread @ (scatter + before) @ bread
     square = np.maximum(np.maximum(np.diag(plain), np.diag(filled)), 0.0)
     half = stdtrit(freedom, 0.975) * np.sqrt(square)
+    if len(errors):
+        moved = (errors @ jacobian / variance) @ bread
+        half = np.maximum(half, stdtrit(len(errors), 0.975) * np.sqrt(np.mean(moved**2, axis=0)))
     half[(np.linalg.norm(jacobian, axis=0) < 1e-9) & (known == 0.0)] = np.inf
     return np.asarray(half)
 

@@ -17,7 +17,7 @@ from coupled.gap.search.case import Case
 from coupled.gap.search.descent import WHOLE, Descent
 from coupled.gap.search.fit import fit_set
 from coupled.gap.search.found import Fit
-from coupled.gap.signals.output import Output, Part, stage_gaps, stage_limits
+from coupled.gap.signals.output import Output, Part, memory, stage_gaps, stage_limits
 from coupled.gap.thresholds import MISMATCH, NORMAL_95
 from coupled.rig.rig import Rig
 
@@ -30,6 +30,34 @@ class Prior(NamedTuple):
 
     mean: float
     sigma: float
+
+
+@dataclass(frozen=True)
+class ModelError:
+    """The error of a correct effect's physics in each output, beside noise of variance 1.
+
+    `power` is its variance in noise floors², `samples` its effective samples, those of the residual
+    of which it is a share. Both have the shape (outputs,).
+    """
+
+    power: Floats
+    samples: Floats
+
+    @property
+    def variance(self) -> Floats:
+        """The variance of each output's residual, noise floors²."""
+        return np.asarray(1.0 + self.power)
+
+    def smooth(self, noise: Floats) -> Floats:
+        """Return the autocorrelation time of noise over that of noise and model error together.
+
+        `noise` are the effective samples of the noise alone.
+        """
+        return np.asarray(self.variance / (1.0 + self.power * noise / self.samples))
+
+    def of(self, index: Sequence[int]) -> ModelError:
+        """Return the model error of some outputs."""
+        return ModelError(self.power[list(index)], self.samples[list(index)])
 
 
 @dataclass(frozen=True)
@@ -130,15 +158,16 @@ class Problem:
         short = self.case.by_shots
         return None if short is None else Problem(short)
 
-    def variances(self, without: Rig) -> Floats:
-        """Return the variance of each output's residual, noise floors², shape (outputs,).
+    def model_error(self, without: Rig) -> ModelError:
+        """Return the model error of each output: a share of the residual of a rig without effects.
 
-        The sum of the noise variance and the model error, a share of the residual of the rig
-        without effects. Outputs of exact laws (`EXACT`) have no model error.
+        Outputs of exact laws (`EXACT`) have none.
         """
         gaps = np.array([output.gap(without) for output in self.outputs])
-        error = np.array([0.0 if one.stage in EXACT else MISMATCH for one in self.outputs])
-        return np.asarray(1.0 + (error * np.maximum(gaps - 1.0, 0.0)) ** 2)
+        share = np.array([0.0 if one.stage in EXACT else MISMATCH for one in self.outputs])
+        lefts = [output.residual(without) for output in self.outputs]
+        samples = np.array([len(left) / memory(left) for left in lefts])
+        return ModelError((share * np.maximum(gaps - 1.0, 0.0)) ** 2, samples)
 
 
 def _unlimited(name: str, setting: Effect) -> Effect:

@@ -31,7 +31,7 @@ from coupled.gap.chain import BY_NAME as STAGE_OF
 from coupled.gap.effects.effect import Effect, touched
 from coupled.gap.search.evidence import misfit
 from coupled.gap.search.found import Fit
-from coupled.gap.search.problem import Problem
+from coupled.gap.search.problem import ModelError, Problem
 from coupled.gap.signals.output import Floats, memory
 from coupled.gap.thresholds import (
     BEAM_CANDIDATES,
@@ -57,7 +57,8 @@ class Screened(NamedTuple):
     """A candidate, the starts of its fits, and the projection of the residual on its signature.
 
     `taken` is the power of the projection, noise floors², `gain` the predicted log-likelihood gain,
-    `direction` the signature with the largest projection, of unit length.
+    `direction` the signature with the largest projection, of unit length. `refitted` as in
+    `_screened`.
     """
 
     effect: Effect
@@ -65,6 +66,7 @@ class Screened(NamedTuple):
     taken: float
     gain: float
     direction: Floats
+    refitted: bool
 
 
 class Worth(NamedTuple):
@@ -87,7 +89,7 @@ class Screen:
     """The screen of candidates to add to a set, with a cache of their signatures."""
 
     problem: Problem
-    variance: Floats
+    error: ModelError
     known: dict[str, list[_Signature]] = field(default_factory=dict)
 
     def best(
@@ -129,6 +131,13 @@ class Screen:
         least = SCREEN_NEAR * found[0].taken if found else 0.0
         return [one for one in found[:most] if one.taken >= least]
 
+    def still_worth(
+        self, current: Fit, screened: Sequence[Screened], worth: Worth
+    ) -> list[Screened]:
+        """Return the screened candidates whose gain, with other effective samples, is enough."""
+        again = [self._screened(current, e.effect, worth.counts, e.refitted) for e in screened]
+        return [one for one, now in zip(screened, again, strict=True) if now.gain > worth.least]
+
     def pair(
         self, current: Fit, candidates: Sequence[Effect], worth: Worth
     ) -> tuple[Screened, Screened] | None:
@@ -151,8 +160,7 @@ class Screen:
             i, j = _best_two(shapes, now)
             both = shapes[[i, j]].T
             left = now - both @ np.linalg.lstsq(both, now, rcond=None)[0]
-            squares = [misfit(self._squares(ours, one)) for one in (now, left)]
-            gain = 0.5 * float(self._samples(ours, left) @ (squares[0] - squares[1]))
+            gain = self._gain(ours, now, left, self._samples(ours, left))
             if gain > worth.least + PRIOR_EFFECT and (found is None or gain > found[0]):
                 found = gain, (each[i], each[j])
         return None if found is None else found[1]
@@ -169,6 +177,15 @@ class Screen:
         """Return the effective samples of some outputs' residuals."""
         parts = np.split(left, self._edges(ours)[1:])
         return np.array([len(part) / memory(part) for part in parts])
+
+    def _gain(self, ours: Sequence[int], before: Floats, after: Floats, samples: Floats) -> float:
+        """Return the increase of the log-likelihood of some outputs from one residual to another.
+
+        `samples` are the effective samples of each output.
+        """
+        smooth = self.error.of(ours).smooth(samples)
+        misfits = [misfit(self._squares(ours, left), smooth) for left in (before, after)]
+        return 0.5 * float(samples @ (misfits[0] - misfits[1]))
 
     def _slopes(self, current: Fit, effect: Effect) -> Floats:
         """Return an orthonormal basis of the current effects' signatures, (frames, parameters).
@@ -197,7 +214,7 @@ class Screen:
         """Return the mean squares of some outputs' residuals, over their variance."""
         frames = np.array([len(self.problem.outputs[k].measured) for k in ours])
         squares = np.add.reduceat(left**2, self._edges(ours)) / frames
-        return np.asarray(squares / self.variance[list(ours)])
+        return np.asarray(squares / self.error.variance[list(ours)])
 
     def _screened(
         self, current: Fit, effect: Effect, counts: Floats, refitted: bool = False
@@ -210,11 +227,9 @@ class Screen:
         now, ours = _residual(self.problem, effect, current.rig), self._ours(effect)
         beside = self._slopes(current, effect) if refitted else np.zeros((len(now), 0))
 
-        first = misfit(self._squares(ours, now))
-
         def gain_to(left: Floats) -> float:
             samples = self._samples(ours, left) if refitted else counts[ours]
-            return 0.5 * float(samples @ (first - misfit(self._squares(ours, left))))
+            return self._gain(ours, now, left, samples)
 
         taken, gain, starts = 0.0, 0.0, dict[int, tuple[float, Values]]()
         direction = np.zeros(len(now))
@@ -234,7 +249,8 @@ class Screen:
             left = float((now + change) @ (now + change))
             if shape not in starts or left < starts[shape][0]:
                 starts[shape] = left, values
-        return Screened(effect, [values for _, values in starts.values()], taken, gain, direction)
+        found = [values for _, values in starts.values()]
+        return Screened(effect, found, taken, gain, direction, refitted)
 
     def _signatures(self, current: Fit, effect: Effect) -> list[_Signature]:
         """Return an effect's signatures with the current effects."""
@@ -337,8 +353,9 @@ def is_limit(effect: Effect) -> bool:
 def limits(effect: Effect, shows: Callable[[float], bool]) -> list[list[float]]:
     """Return sets of limits to try, from the largest limit that shows down, in the limit's unit.
 
-    The best of each set is a start. `shows` returns whether a limit changes the prediction. Return
-    no set if not even the lowest limit does.
+    The best of each set is a start. The first set ends with the limit's own starts below it: a
+    stiffness may be far below the largest that shows. `shows` returns whether a limit changes the
+    prediction. Return no set if not even the lowest limit does.
     """
     number = effect.free[0]
     low, high = math.log(number.low), math.log(number.high)
@@ -349,4 +366,7 @@ def limits(effect: Effect, shows: Callable[[float], bool]) -> list[list[float]]:
         low, high = (middle, high) if shows(math.exp(middle)) else (low, middle)
     sets = (LIMIT_SHARES, SERVO_SHARES) if effect.stage == "linkage" else (LIMIT_SHARES,)
     most = math.exp(low)
-    return [[max(share * most, number.low) for share in shares] for shares in sets]
+    found = [[max(share * most, number.low) for share in shares] for shares in sets]
+    below = [start for start in number.starts if start < min(found[0])]
+    found[0] += sorted(below, reverse=True)
+    return found

@@ -63,9 +63,14 @@ def drifts(rig: Rig, control: ControlName, gradient: float) -> bool:
 
 
 def softest_gradient(rig: Rig, control: ControlName, record: Record) -> float:
-    """Return a record's least gradient, N/d: as recorded, from its q̄, or the table's least."""
+    """Return a record's least gradient, N/d: as recorded, from its q̄, or the table's least.
+
+    Of a curve, that of its softest segment.
+    """
     gradient, pressure = channel(control, "gradient"), "dynamic_pressure_Pa"
     schedule = rig.controls[control].schedule
+    if schedule.curved:
+        return min(map(min, schedule.segments))
     if gradient in record:
         return float(np.min(record[gradient]))
     if pressure in record:

@@ -85,7 +85,7 @@ def times_missed(record: Record) -> Floats:
     return np.asarray((record.time_s - record.time_s[0])[missed_in(record).seen])
 
 
-def spread_of_missed(record: Record, frame_s: float) -> float:
+def spread_of_missed(rig: Rig, record: Record) -> float:
     """Return the relative sampling error of the share of missed frames.
 
     For n frames missed at random it is √((1 − share)/n).

@@ -49,6 +49,7 @@ def coarsely_stepped(rig: Rig) -> Rig:
 
 
 Floats = NDArray[np.float64]
+TRIM = "elevator_trim_rad"  # the channel of an output: elevator position in trim
 Predict = Callable[[Rig], Floats]
 Part = Literal["all", "fitted", "held"]
 _KEPT = 8  # size of the cache of residuals; threads fit different effects at once
@@ -82,7 +83,7 @@ class HiddenGap:
         """The reason in words."""
         if self.still:
             return f"{self.channel} shows little but noise"
-        share = f"{100 * self.share:.0f} %"
+        share = f"{100 * self.share:.0f} %" if self.share < 1.0 else "more than the whole"
         if self.misses:
             missed = f"the rig misses the healthy record there by {self.misses:.3g} times the noise"
             return f"{missed}, {share} of the stage's motion"
@@ -95,8 +96,10 @@ class HiddenGap:
             return "Fit the rig to the healthy record first (coupled fit), then diagnose again."
         if self.still:
             return f"Record a force that moves {self.channel}, or {self.noisiest} with less noise."
-        times = math.ceil(self.share / SMALL)
-        return f"Record a motion {times} times as large, or {self.noisiest} with less noise."
+        larger = f"{math.ceil(self.share / SMALL)} times as large"
+        if self.share >= 1.0:
+            larger = "far larger than that noise"
+        return f"Record a motion {larger}, or {self.noisiest} with less noise."
 
 
 @dataclass(frozen=True)
@@ -117,6 +120,7 @@ class Output:
     in_series  predicted from the force by loader and linkage in series
     shots      prediction by multiple shooting: short replays, restarted as measured
     handed_on  part of the measurement that comes from the input; the rest is the stage's own motion
+    errors     samples of the propagated error of the input; of one number in all of a record's
     """
 
     stage: str
@@ -138,6 +142,7 @@ class Output:
     in_series: bool = False
     shots: Predict | None = field(default=None, repr=False, compare=False)
     handed_on: Floats | None = field(default=None, repr=False, compare=False)
+    errors: Sequence[Floats] = field(default=(), repr=False, compare=False)
     _known: list[tuple[Any, Floats]] = field(default_factory=list, repr=False, compare=False)
 
     def allows_coarse_steps(self, rig: Rig) -> bool:

@@ -27,8 +27,9 @@ from coupled.gap.thresholds import BEGUN_AWAY, BEGUN_MOVING, SETTLE_s
 from coupled.record.channels import SURFACES, ControlName, channel
 from coupled.record.record import Record
 from coupled.rig.crossing import leaking
+from coupled.rig.hosted import Feel, OtherInputs
 from coupled.rig.nodes import on_nodes
-from coupled.rig.parameters import Sensing
+from coupled.rig.parameters import Schedule, Sensing
 from coupled.rig.recorder import stamped
 from coupled.rig.replay import replay_schedule
 from coupled.rig.rig import Rig
@@ -46,14 +47,19 @@ class Sensed:
     def _of(self) -> Sensing:
         return self.rig.controls[self.control].sensing
 
-    def at_grip(self, shown: Floats) -> Floats:
-        """Return the reading of the grip's transducer, d, from its deflection on the arc."""
+    def at_grip(self, shown: Floats, force: Floats) -> Floats:
+        """Return the reading of the grip's transducer, d, from its deflection on the arc, and F."""
         curve = self._of.grip_curve
-        return self._of.deflection_zero + (curve.at(shown) if curve.nodes else shown)
+        return self._loaded(force) + (curve.at(shown) if curve.nodes else shown)
 
-    def from_grip(self, read: Floats) -> Floats:
-        """Return the deflection at the grip, d, from the reading of its transducer."""
-        return self._of.grip_curve.inverse(read - self._of.deflection_zero)
+    def from_grip(self, read: Floats, force: Floats) -> Floats:
+        """Return the deflection at the grip, d, from the reading of its transducer, and F in N."""
+        return self._of.grip_curve.inverse(read - self._loaded(force))
+
+    def _loaded(self, force: Floats) -> Floats | float:
+        """Return what the reading at the grip has beyond its curve, d."""
+        curve, zero = self._of.grip_load_curve, self._of.deflection_zero
+        return zero + curve.at(force) if curve.nodes else zero
 
     def hum(self, read: Floats) -> Floats | float:
         """Return the mains hum at each frame in δc as read, d."""
@@ -203,19 +209,31 @@ class Reading:
         names = [channel(name, "force") for name in leaking(self.control)]
         return [self._measured(name) for name in names if name in self.record][:1]
 
-    def load(self) -> Callable[[Rig], Floats | None]:
-        """Return the load factor at the bob weight as a function of the rig; none if not recorded.
+    def other_inputs(self) -> Callable[[Rig], OtherInputs]:
+        """Return the loader's inputs beside force and motion, as a function of the rig.
 
-        The load factor acts without the delay of its time stamp, which is removed.
+        The load factor at the bob weight acts without the delay of its time stamp.
         """
+        regressor = self.regressor()
         if LOAD not in self.record:
-            return lambda rig: None
+            return lambda rig: OtherInputs(None, regressor)
         read, rate_Hz = smoothed(self.record[LOAD]), self.rig.frame_rate
 
-        def with_load(rig: Rig) -> Floats:
-            return stamped(read, -rig.flight.motion_stamp * rate_Hz if rig.flight else 0.0)
+        def stamped_as(rig: Rig) -> OtherInputs:
+            late_s = rig.flight.motion_stamp if rig.flight else 0.0
+            return OtherInputs(stamped(read, -late_s * rate_Hz), regressor)
 
-        return with_load
+        return stamped_as
+
+    def regressor(self) -> Floats | None:
+        """Return the channel on which force and friction depend, less its reference, in its unit.
+
+        None if the rig file names no channel.
+        """
+        loader = self.rig.controls[self.control].loader
+        if loader.regressor is None:
+            return None
+        return smoothed(self.record[loader.regressor]) - loader.regressor_reference
 
     def sensed(self, rig: Rig) -> Sensed:
         """Return the conversion of a rig's readings of this control to the measured quantities."""
@@ -235,21 +253,22 @@ class Reading:
     def missing(self) -> dict[str, list[str]]:
         """Return the channels that each stage needs and the record does not have."""
         needs = {
-            "schedule": [PRESSURE, self.name_of("gradient")],
-            "loader": [self.name_of(q) for q in ("force", "computed")] + self._gradient_from(),
+            "schedule": [PRESSURE, self.name_of("gradient")]
+            + [self.name_of("computed")] * self.schedule.curved,
+            "loader": [self.name_of(q) for q in ("force", "computed")] + self._feel_from(),
             "multiplier": [self.name_of(q) for q in ("computed", "modifying_force")]
-            + self._gradient_from(),
+            + self._feel_from(),
             "linkage": [self.name_of(q) for q in ("computed", "force", "deflection")],
             "compensation": [self.name_of(q) for q in ("computed", "force", "estimate")],
             "surface": [self.name_of("estimate"), PRESSURE, self.surface],
         }
         if self.moved:
-            loader = [self.name_of("force"), self.name_of(self.imposed), *self._gradient_from()]
+            loader = [self.name_of("force"), self.name_of(self.imposed), *self._feel_from()]
             needs = {"schedule": needs["schedule"], "loader": loader}
         elif self.in_series:
             del needs["linkage"]
             needs["loader"] = [self.name_of(q) for q in ("force", "deflection")]
-            needs["loader"] += self._gradient_from()
+            needs["loader"] += self._feel_from()
         elif self.set_points:  # without the force only a bend cannot be identified
             needs["linkage"] = [self.name_of(q) for q in ("computed", "deflection")]
         lacking = {s: [n for n in names if n not in self.record] for s, names in needs.items()}
@@ -306,36 +325,41 @@ class Reading:
         """Return the name of a quantity's channel."""
         return channel(self.control, quantity)
 
-    def _gradient_from(self) -> list[str]:
-        """Return the channel from which G_T is taken: its own, else q̄.
+    @property
+    def schedule(self) -> Schedule:
+        """The schedule of the control."""
+        return self.rig.controls[self.control].schedule
 
-        Empty if the record has neither and the rig has one gradient at any q̄.
+    def _feel_from(self) -> list[str]:
+        """Return the channel that the loader's feel needs: q̄ if there are several segments.
+
+        Else that of G_T, for which q̄ may stand. Empty if the feel is the same at any q̄.
         """
         own = self.name_of("gradient")
-        if own in self.record:
-            return [own]
-        if PRESSURE in self.record:
+        if is_constant(self.schedule):
+            return []
+        if len(self.schedule.segments) > 1 or (PRESSURE in self.record and own not in self.record):
             return [PRESSURE]
-        return [] if one_gradient(self.rig, self.control) else [own]
+        return [own]
 
-    def gradient(self) -> Floats:
-        """Return G_T in N/d: as recorded, else of the nominal schedule at q̄."""
-        source = self._gradient_from()
-        if source == [PRESSURE]:
+    def feel(self) -> Feel:
+        """Return what the host specified: G_T as recorded, else of the nominal schedule at q̄.
+
+        G_T beyond the break is never recorded, and a curve is always that of q̄.
+        """
+        own, share, schedule = self.name_of("gradient"), left(self), self.schedule
+        pressure = np.full(len(self.record), schedule.dynamic_pressure[0])
+        if PRESSURE in self.record:
             pressure = smoothed(self.record[PRESSURE])
-            return replay_schedule(self.rig, self.control, pressure) * left(self)
-        if source:
-            return self.signal("gradient")
-        table = self.rig.controls[self.control].schedule.total_gradient
-        return np.full(len(self.record), table[0]) * left(self)
-
-    def second(self) -> Floats | None:
-        """Return G_T beyond the break, of the nominal schedule at q̄; it is never recorded."""
-        two = self.rig.controls[self.control].schedule.second_gradient is not None
-        if not two or PRESSURE not in self.record:
-            return None
-        smooth = smoothed(self.record[PRESSURE])
-        return replay_schedule(self.rig, self.control, smooth, beyond=True) * left(self)
+        if schedule.curved:
+            softest = np.full(len(self.record), min(map(min, schedule.segments)))
+            return Feel(softest * share, None, pressure, share)
+        first, second = (
+            replay_schedule(self.rig, self.control, pressure, beyond) * share
+            for beyond in (False, True)
+        )
+        given = self.signal("gradient") if own in self.record else first
+        return Feel(given, None if schedule.second_gradient is None else second)
 
     def channel_noise(self, quantity: str) -> Noise:
         """Return the noise of a control's channel."""
@@ -356,11 +380,9 @@ class Reading:
         }
 
 
-def one_gradient(rig: Rig, control: ControlName) -> bool:
-    """Return whether a control's gradient is the same at any q̄ (0 without a spring)."""
-    schedule = rig.controls[control].schedule
-    first, *rest = schedule.total_gradient
-    return schedule.second_gradient is None and all(g == first for g in rest)
+def is_constant(schedule: Schedule) -> bool:
+    """Return whether a control's feel is the same at any q̄."""
+    return all(g == row[0] for row in schedule.segments for g in row)
 
 
 def worth_recording(
@@ -373,7 +395,7 @@ def worth_recording(
     """
     data = rig.controls[control]
     host = rig.flight is not None or data.compensation.deflection or data.compensation.gradient
-    scheduled = len(set(data.schedule.total_gradient)) > 1
+    scheduled = not is_constant(data.schedule)
     soft = any((data.loader.bend, data.loader.play, data.loader.arc_geometry))
     has = {"schedule": scheduled, "compensation": host, "linkage": host or soft}
     has["surface"] = rig.flight is not None

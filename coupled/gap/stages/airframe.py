@@ -14,7 +14,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from hashlib import sha256
 from typing import Any
 
@@ -22,13 +23,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.errors import InputError
+from coupled.flight.gusts import DRAWN, GivenAir
 from coupled.gap.noise.smooth import smoothed
-from coupled.gap.signals.air import Air, vertical_air
+from coupled.gap.signals.air import NEEDS_ACROSS, Air, crossing_air, vertical_air
 from coupled.gap.signals.floors import left_noise
-from coupled.gap.signals.output import Output, estimate_noise, spread, white
+from coupled.gap.signals.output import TRIM, Output, estimate_noise, spread, white
 from coupled.gap.stages.openloop import Between, Flown, Moved, flown_in, fly_open_loop
-from coupled.gap.stages.shots import SLOW, Restarts, States
-from coupled.gap.stages.surfaces import Trim, flown_by, moved, surface_channel, surface_points
+from coupled.gap.stages.shots import SLOW, Restarts, States, is_throttled
+from coupled.gap.stages.surfaces import (
+    Trim,
+    flown_by,
+    is_led,
+    moved,
+    surface_channel,
+    surface_points,
+)
 from coupled.gap.stages.trim import trim_of
 from coupled.gap.thresholds import FAR, KNOWN, SHOT_TRIES
 from coupled.record.channels import LATERAL, ControlName, channel, motion_channels
@@ -37,6 +46,7 @@ from coupled.rig.parameters import Flight
 from coupled.rig.recorder import stamped
 from coupled.rig.rig import Rig
 from coupled.schema import changed
+from coupled.units import GRAVITY_m_per_s2
 
 Floats = NDArray[np.float64]
 RATE = "pitch_rate_rad_per_s"
@@ -48,8 +58,8 @@ COMPARED = (
     "yaw_rate_rad_per_s",
     "sideslip_rad",
 )
-TRIM = "elevator_trim_rad"  # elevator position in trim
-_KEPT = 24  # size of the cache of flights
+_SIDE = ("forces/fby-total-lbs", "inertia/weight-lbs")
+_KEPT = 128  # size of the cache of flights: most of a search; 0.4 MB each in a minute of record
 
 
 class Flights:
@@ -80,16 +90,57 @@ class Model:
     record: Record
     moved: Sequence[Moved]
     compared: tuple[str, ...]
-    air: Air | None
     flights: Flights = field(default_factory=Flights)
     restarts: Restarts | None = None
+
+    @cached_property
+    def side_m_per_s2(self) -> Floats | None:
+        """The side force per mass that the model has in the measured flow, shape (frames,).
+
+        None if the record lacks a channel of the flow.
+        """
+        if self.restarts is None or any(name not in self.record for name in NEEDS_ACROSS):
+            return None
+        assert self.rig.flight is not None
+        states, names = replace(self.restarts, every=1).at(), (RATE, *_SIDE)
+        motion = self.fly(self.rig.flight, self.moved, restarts=states, channels=names, air=DRAWN)
+        return np.asarray(motion.motion[:, 1] / motion.motion[:, 2] * GRAVITY_m_per_s2)
+
+    @cached_property
+    def up(self) -> Air | None:
+        """The vertical motion of the air; None if the record lacks a channel."""
+        return vertical_air(self.record, 1.0 / self.rig.frame_rate, self.side_m_per_s2)
+
+    @cached_property
+    def across(self) -> Air | None:
+        """The motion of the air across the heading; None if the record lacks a channel."""
+        return crossing_air(self.record, 1.0 / self.rig.frame_rate, self.side_m_per_s2)
+
+    def air(self, flight: Flight, late: float = 0.0, with_error: bool = False) -> GivenAir:
+        """Return the air of a flight with gusts, over each frame.
+
+        The recorded motion, and so the estimate, is `late` frames late. `with_error` adds a sample
+        of its error.
+        """
+
+        def scaled(rms: float, air: Air | None) -> list[float] | None:
+            if air is None or air.rms == 0.0:
+                return None
+            moves = air.speed * (rms / air.rms)
+            moves = stamped(moves + air.error if with_error else moves, -late)
+            return [*moves[1:].tolist(), 0.0]  # row k + 1 holds the air over the frame before
+
+        return GivenAir(
+            scaled(flight.gust_rms, self.up) if flight.gust_rms > 0.0 else None,
+            scaled(flight.lateral_gust_rms, self.across) if flight.lateral_gust_rms > 0.0 else None,
+        )
 
     def flown(self, rig: Rig) -> Flown | None:
         """Return the compared channels and the trim of `rig`; None if it cannot be trimmed."""
         assert rig.flight is not None
         flight = changed(rig.flight, {"motion_stamp_s": 0.0}, self.rig.name, "flight")
         # The air is estimated from the recorded motion, so it has the same late time stamps.
-        late = rig.flight.motion_stamp * self.rig.frame_rate if flight.gust_rms > 0.0 else 0.0
+        late = rig.flight.motion_stamp * self.rig.frame_rate if has_gusts(flight) else 0.0
         asked = (flight, self.compared, _digest(self.moved), late)
         return self.flights.of(asked, lambda: self.fly(flight, self.moved, late=late))
 
@@ -125,12 +176,14 @@ class Model:
         again = self.fly(flight, self.moved, restarts=states).motion[:, 1:]
         return again - plain[:, [names.index(name) for name in SLOW]]
 
-    def wrong_shots(self, wrong: Sequence[Moved], plain: Floats) -> list[Floats]:
+    def wrong_shots(self, wrong: Sequence[Sequence[Moved]], plain: Floats) -> list[Floats]:
         """Return the changes of speed and attitude by errors of surfaces, air and restarts."""
         assert self.rig.flight is not None and self.restarts is not None
         flight = changed(self.rig.flight, {"motion_stamp_s": 0.0}, self.rig.name, "flight")
-        each = [self.restarts.wrong(sample) for sample in range(SHOT_TRIES)]
-        flown = [self.fly(flight, wrong, with_error=True, restarts=states) for states in each]
+        flown = [
+            self.fly(flight, one, with_error=True, restarts=self.restarts.wrong(sample))
+            for sample, one in enumerate(wrong)
+        ]
         return [one.motion[:, 1:] - plain for one in flown]
 
     def carried(self, wrong: Sequence[Moved], plain: Flown) -> Floats:
@@ -151,23 +204,26 @@ class Model:
         between: Between = "pchip",
         restarts: States | None = None,
         channels: tuple[str, ...] = (),
+        air: GivenAir | None = None,
     ) -> Flown:
         """Return the flight with the given surface motion, interpolated between the rows.
 
-        `with_error` adds a sample of its error to the air, whose estimate is `late` frames late.
-        The `channels` are those compared, or speed and attitude where it restarts.
+        `with_error` adds a sample of its error to the air, whose estimate is `late` frames late,
+        if it is not given. The `channels` are those compared, or of a flight with restarts the
+        slow ones.
         """
-        air = None
-        if flight.gust_rms > 0.0 and self.air is not None and self.air.rms > 0.0:
-            moves = self.air.speed * (flight.gust_rms / self.air.rms)
-            moves = stamped(moves + self.air.error if with_error else moves, -late)
-            air = (*moves[1:].tolist(), 0.0)  # row k + 1 holds the air over the frame before
+        air = self.air(flight, late, with_error) if air is None else air
         controls, rate_Hz = flown_by(self.rig), self.rig.frame_rate
         channels = channels or (self.compared if restarts is None else (RATE, *SLOW))
-        given = (flight, rate_Hz, controls, moved, channels, air)
+        given = (flight, rate_Hz, controls, moved, channels)
         known = flown_in(self.record, controls, rate_Hz)
         between = "held" if self.rig.controls else between
-        return fly_open_loop(*given, known, between_rows=between, restarts=restarts)
+        return fly_open_loop(*given, known, air=air, between_rows=between, restarts=restarts)
+
+
+def has_gusts(flight: Flight) -> bool:
+    """Tell whether the air of an aircraft moves."""
+    return max(flight.gust_rms, flight.lateral_gust_rms) > 0.0
 
 
 def _digest(moved: Sequence[Moved]) -> bytes:
@@ -199,6 +255,25 @@ def _was_moved(record: Record, control: ControlName) -> bool:
     return any(name in record and np.ptp(record[name]) > 0.0 for name in names)
 
 
+def gusts_of(rig: Rig, record: Record) -> Model | None:
+    """Return the aircraft of a record, which estimates the motion of the air; None for a bench."""
+    if rig.flight is None or any(name not in record for name in needs(rig, record)):
+        return None
+    right, _, _ = _driven(rig, record)
+    return Model(rig, record, right, (), restarts=Restarts.of(record, rig.frame_rate))
+
+
+def _driven(
+    rig: Rig, record: Record
+) -> tuple[list[Moved], list[list[Moved]], dict[ControlName, Trim]]:
+    """Return the motion of the surfaces, the same with samples of its error, and the trims."""
+    each = {control: trim_of(rig, record, control) for control in flown_by(rig)}
+    trims = {control: trim for control, trim in each.items() if trim is not None}
+    rng = np.random.default_rng(43)
+    made = [moved(rig, record, trims, rng) for _ in range(SHOT_TRIES)]
+    return made[0][0], [wrong for _, wrong in made], trims
+
+
 def airframe_outputs(
     rig: Rig,
     record: Record,
@@ -212,19 +287,19 @@ def airframe_outputs(
     if rig.flight is None or any(name not in record for name in needs(rig, record)):
         return []
     judged = _known_motion(rig, record)
-    by_laws = [surface_channel(c) for c in flown_by(rig) if surface_points(rig, c) is None]
+    by_laws = [
+        surface_channel(control)
+        for control in flown_by(rig)
+        if surface_points(rig, control) is None and not is_led(rig, record, control)
+    ]
     wanted = [name for name in (*COMPARED, *by_laws) if name in judged and name in record]
     compared = tuple(name for name in wanted if np.ptp(record[name]) > 0.0)
-    each = {control: trim_of(rig, record, control) for control in flown_by(rig)}
-    trims = {control: trim for control, trim in each.items() if trim is not None}
-    right, wrong = moved(rig, record, trims, np.random.default_rng(43))
-    air = vertical_air(record, 1.0 / rig.frame_rate)
+    right, wrong, trims = _driven(rig, record)
     known = Flights() if flights is None else flights
-    restarts = Restarts.of(record, rig.frame_rate)
-    model = Model(rig, record, right, compared, air, known, restarts)
+    model = Model(rig, record, right, compared, known, Restarts.of(record, rig.frame_rate))
     flown = model.flown(rig)
     assert flown is not None  # the filed rig can be trimmed
-    carried = model.carried(wrong, flown)
+    carried = [model.carried(one, flown) for one in wrong]
     unknown = model.unknown_between(flown.motion)
     outputs = []
     for i, name in enumerate(compared):
@@ -232,9 +307,10 @@ def airframe_outputs(
             estimate_noise(record[name]), record[name], record[name] - flown.motion[:, i]
         )
         own = float(np.hypot(noise.rms, KNOWN * np.ptp(record[name])))
-        moved_by = float(np.sqrt(np.mean(carried[:, i] ** 2 + unknown[:, i] ** 2)))
+        errors = [one[:, i] for one in carried]
+        moved_by = float(np.sqrt(np.mean(np.square(errors)) + np.mean(unknown[:, i] ** 2)))
         floor = float(np.hypot(own, moved_by))
-        loose = spread([carried[:, i]], own, noise.memory, rig.frame_rate)
+        loose = spread(errors, own, noise.memory, rig.frame_rate)
 
         def predict(other: Rig, i: int = i, name: str = name, floor: float = floor) -> Floats:
             assert other.flight is not None
@@ -245,15 +321,15 @@ def airframe_outputs(
             return stamped(np.asarray(made.motion[:, i]), late)
 
         given = (record[name], predict, floor, rig.frame_rate, number, loose, moved_by / floor)
-        outputs.append(Output("airframe", name, *given))
-    if restarts is not None:
+        outputs.append(Output("airframe", name, *given, errors=errors))
+    if model.restarts is not None and not is_throttled(record):
         outputs += _slow_outputs(model, wrong, number)
     if "column" in trims:
         outputs.append(_trim_output(model, record, trims["column"], number))
     return outputs
 
 
-def _slow_outputs(model: Model, wrong: Sequence[Moved], number: int) -> list[Output]:
+def _slow_outputs(model: Model, wrong: Sequence[Sequence[Moved]], number: int) -> list[Output]:
     """Return speed and pitch attitude, predicted in segments restarted as measured."""
     record, rate_Hz = model.record, model.rig.frame_rate
     shots = model.shots(model.rig)
@@ -277,7 +353,7 @@ def _slow_outputs(model: Model, wrong: Sequence[Moved], number: int) -> list[Out
             return stamped(np.asarray(made[:, i]), other.flight.motion_stamp * rate_Hz)
 
         given = (record[name], predict, floor, rate_Hz, number, loose, moved_by / floor)
-        outputs.append(Output("airframe", name, *given))
+        outputs.append(Output("airframe", name, *given, errors=errors))
     return outputs
 
 

@@ -24,7 +24,7 @@ from coupled.gap.signals.floors import unsmoothed, with_error
 from coupled.gap.signals.output import Floats, Predict
 from coupled.gap.signals.reading import Reading
 from coupled.gap.thresholds import FAR_SIGMAS, ROUNDING_SPAN
-from coupled.rig.hosted import held_over
+from coupled.rig.hosted import Feel, held_over
 from coupled.rig.replay import replay_compensation, replay_product
 from coupled.rig.rig import Rig
 
@@ -115,9 +115,8 @@ class Product:
         return self.reading.channel_noise("computed")
 
     @cached_property
-    def _gradients(self) -> tuple[Floats, Floats | None]:
-        """G_T below and above the break, N/d."""
-        return self.reading.gradient(), self.reading.second()
+    def _feel(self) -> Feel:
+        return self.reading.feel()
 
     @cached_property
     def _neutral(self) -> Floats:
@@ -131,7 +130,7 @@ class Product:
         missed, assumed = of.missed.under(rig, of.control), of.assumed()
         more = None if assumed is None else assumed.gradient
         place = read - self._neutral
-        return replay_product(rig, of.control, place, *self._gradients, missed, more)
+        return replay_product(rig, of.control, place, self._feel, missed, more)
 
 
 def compensated(reading: Reading) -> tuple[str, Floats, Predict, float, float]:

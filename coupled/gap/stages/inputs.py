@@ -124,8 +124,8 @@ class Imposed:
         self._reading = reading
         self._motion = smoothed(reading.signal(reading.imposed))
         self._level: Noise = reading.driving(reading.imposed)
-        self._gradient = reading.gradient()
-        self._load = reading.load()
+        self._feel = reading.feel()
+        self._inputs = reading.other_inputs()
         self._force = reading.pulled()
         self._others = {name: smoothed(other) for name, other in reading.others().items()}
 
@@ -142,14 +142,15 @@ class Imposed:
         def at_loader(rig: Rig) -> Floats:
             read_as = reading.sensed(rig)
             if reading.imposed == "deflection":
-                grip, bending = read_as.from_grip(moved), read_as.force(pulled)
+                bending = read_as.force(pulled)
+                grip = read_as.from_grip(moved, bending)
                 return behind_linkage(rig, reading.control, grip, bending, self._others)
             nodes = imposed.of(rig)
             return read_as.before_curve(np.asarray(nodes / read_as.scale_on_nodes(len(nodes))))
 
         def predicted(rig: Rig) -> Floats:
             data, true = rig.controls[reading.control], at_loader(rig)
-            answer = answer_to(rig, reading.control, true, self._gradient, self._load(rig))
+            answer = answer_to(rig, reading.control, true, self._feel, self._inputs(rig))
             late_s = data.sensing.force_stamp - data.loader.delay
 
             def read(force: Floats) -> Floats:
@@ -194,8 +195,8 @@ class Series:
 
     def __init__(self, reading: Reading, force: Drive, hosted: Hosted) -> None:
         self._reading, self.force, self._hosted = reading, force, hosted
-        self._gradient, self._second = reading.gradient(), reading.second()
-        self._load = reading.load()
+        self._feel = reading.feel()
+        self._inputs = reading.other_inputs()
         self._grip = smoothed(reading.signal("deflection"))
         self._others = {name: smoothed(other) for name, other in reading.others().items()}
         self._leaks = [Nodes(smoothed(other)) for other in reading.partner()]
@@ -217,10 +218,10 @@ class Series:
             if self._leaks and (share := rig.controls[reading.control].loader.crosstalk):
                 pull = pull + share * self._leaks[0].of(rig)
             host = self._hosted._replace(missed=reading.missed.under(rig, reading.control))
-            driven_by = (pull, (self._gradient, self._second), bending, self._load(rig))
+            driven_by = (pull, self._feel, bending, self._inputs(rig))
             begun = self._begun(rig, bending)
             read = drive_series(rig, reading.control, *driven_by, host, self._others, begun)
-            return sensed.at_grip(read)
+            return sensed.at_grip(read, bending)
 
         def taken_up(rig: Rig, times: float) -> Floats:
             loader = rig.controls[reading.control].loader
@@ -244,7 +245,7 @@ class Series:
         if not reading.begins_moved or reading.by_hand:
             return None
         bend = rig.controls[reading.control].loader.bend
-        place = reading.sensed(rig).from_grip(self._grip) - bend * bending
+        place = reading.sensed(rig).from_grip(self._grip, bending) - bend * bending
         return np.arange(len(place)) == 0, place, rate_of(place, rig.frame_rate)
 
     def _predicted(self, force: Floats, times: float) -> Predict:

@@ -5,13 +5,14 @@ its surface positions in trim (`trim`). The surfaces' deflections from there are
 model's own trim, so that the model does not start with a transient from one trim to the other. A
 measured trim has an error, which would act on a model as a constant deflection, and its attitude
 would drift. If the model's own trim is within that error, the record's trim is therefore taken to
-be the model's own.
+be the model's own; from twice the error on, it is the measured one. In between the deflections are
+moved by a growing part of the difference.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from threading import Lock
 from typing import Literal
@@ -24,7 +25,7 @@ from coupled.flight.aircraft import make_aircraft
 from coupled.flight.airframe import JSBSimAirframe
 from coupled.flight.altered import STILL
 from coupled.flight.everyframe import PROPERTIES
-from coupled.flight.gusts import Gusts
+from coupled.flight.gusts import DRAWN, GivenAir, Gusts
 from coupled.flight.wrapper import Wrapper
 from coupled.gap.signals.conditions import trim_shift, wrappers_of
 from coupled.gap.stages.shots import States
@@ -65,8 +66,9 @@ class Moved:
 
     `channel` is its name. With a map from command to position (`points`), `values` are positions
     in rad, `trim` is the measured position in trim with the largest error `unsure`, and `filed` is
-    the position in trim of the map's model. Otherwise `values` are commands about trim. Row k is
-    the input of the motion in row k.
+    the position in trim of the map's model. With a `gain`, rad of the surface per command, `values`
+    are positions that the commands are to reach beside the aircraft's own laws. Otherwise `values`
+    are commands about trim. Row k is the input of the motion in row k.
     """
 
     channel: str
@@ -75,13 +77,14 @@ class Moved:
     trim: float = 0.0
     filed: float = 0.0
     unsure: float = 0.0
+    gain: float = 0.0
 
     def commands(self, own: float) -> Floats:
         """Return the commands about the trim of a model whose surface trims at `own`."""
         if self.points is None:
             return self.values
         off = own - self.trim
-        beyond = max(abs(off) - self.unsure, 0.0)
+        beyond = min(max(2.0 * (abs(off) - self.unsure), 0.0), abs(off))
         moved = math.copysign(beyond, off) if beyond > SAME_TRIM_rad else 0.0
         return command_of(self.values + moved, self.points) - about(own, self.filed, self.points)
 
@@ -110,16 +113,16 @@ def fly_open_loop(
     controls: Sequence[ControlName],
     moved: Sequence[Moved],
     channels: Sequence[str],
-    air_m_per_s: Sequence[float] | None = None,
     flown: FlownIn | None = None,
     *,
+    air: GivenAir = DRAWN,
     between_rows: Between = "held",
     restarts: States | None = None,
 ) -> Flown:
     """Return the flight of a model from its trim, driven by its surfaces; a row for each frame.
 
     A channel may be any property of the model, in JSBSim's unit; it is 0 if the model lacks it.
-    `air_m_per_s` is the vertical speed of the air over each frame. The conditions of the record's
+    `air` is the motion of the air. The conditions of the record's
     flight (`flown_in`) act on the model as on the aircraft. `between_rows` is how the commands
     change over a frame of several steps: `held`, as those of a host, or interpolated. `restarts`
     are states of the motion from which the flight goes on, by row. Raises InputError if the model
@@ -131,10 +134,10 @@ def fly_open_loop(
         steps = flight.steps_per_frame
         still = changed(still, {"steps_per_frame": 1}, "rig", "flight")
         frame_s /= steps
-        air_m_per_s = None if air_m_per_s is None else np.repeat(air_m_per_s, steps).tolist()
+        air = air.repeated(steps)
     conditions: Sequence[Wrapper] = () if flown is None else flown[0]
     trims = None if flown is None else flown[1]
-    gusts = Gusts(still, frame_s, air_m_per_s=air_m_per_s)
+    gusts = Gusts(still, frame_s, air=air)
     with _flying:
         models = [aircraft_folder()]
         airframe = make_aircraft(
@@ -150,7 +153,35 @@ def fly_open_loop(
         asked[-1] = asked[-2]
         asked = asked[1:] if steps == 1 else _between(asked, steps, between_rows)
         states = {row * steps: state for row, state in (restarts or {}).items()}
-        return Flown(_motion(airframe, asked, channels, states)[::steps], trim)
+        led = [
+            _Led(i, airframe.reader(PROPERTIES[one.channel]), one.gain)
+            for i, one in enumerate(moved)
+            if one.gain
+        ]
+        return Flown(_motion(airframe, asked, channels, states, led)[::steps], trim)
+
+
+@dataclass
+class _Led:
+    """The commands of a surface that is led to positions: number of the control, and the last one.
+
+    `laws` is what the aircraft's own laws added in the frame before, rad, continued linearly.
+    """
+
+    number: int
+    position: Callable[[], float] | None
+    gain: float
+    last: float = 0.0
+    laws: float | None = None
+
+    def to(self, wanted: float) -> float:
+        """Return the command that leads the surface to a position, rad."""
+        assert self.position is not None
+        laws = self.position() - self.gain * self.last
+        before = laws if self.laws is None else self.laws
+        self.last = min(max((wanted - 2.0 * laws + before) / self.gain, -1.0), 1.0)
+        self.laws = laws
+        return self.last
 
 
 def _between(asked: Floats, steps: int, how: Between) -> Floats:
@@ -162,16 +193,21 @@ def _between(asked: Floats, steps: int, how: Between) -> Floats:
 
 
 def _motion(
-    airframe: JSBSimAirframe, asked: Floats, channels: Sequence[str], restarts: States
+    airframe: JSBSimAirframe,
+    asked: Floats,
+    channels: Sequence[str],
+    restarts: States,
+    led: Sequence[_Led] = (),
 ) -> Floats:
     """Return the channels, SI, shape (steps, channels), of a flight with commands about trim.
 
-    A row results from the commands of the row before, or is a state of `restarts`.
+    A row results from the commands of the row before, or is a state of `restarts`. The columns of
+    surfaces that are `led` have their positions.
     """
     each = [airframe.reader(PROPERTIES.get(name, name)) for name in channels]
     step, readers = airframe.step, [read or float for read in each]
     motion: list[list[float]] = []
-    for k, (a, b, c) in enumerate(asked.tolist()):
+    for k, commands in enumerate(asked.tolist()):
         now = [read() for read in readers]
         if (state := restarts.get(k)) is not None:
             airframe.put(state)
@@ -181,5 +217,7 @@ def _motion(
             motion += [motion[-1] if motion else now] * (len(asked) - len(motion))
             break
         motion.append(now)
-        step((a, b, c))
+        for one in led:
+            commands[one.number] = one.to(commands[one.number])
+        step(tuple(commands))
     return np.array(motion) * [_SI.get(name, 1.0) for name in channels]

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from coupled.gap.noise.smooth import Smoother, smoothed
 from coupled.gap.signals.output import estimate_noise
-from coupled.gap.thresholds import SHOT_s
+from coupled.gap.thresholds import NEGLIGIBLE, SHOT_s
 from coupled.record.record import Record
 from coupled.rig.recorder import stamped
 
@@ -76,8 +76,19 @@ def lacking(record: Record) -> tuple[str, ...]:
     return tuple(name for name in NEEDS if name not in record)
 
 
+def is_throttled(record: Record) -> bool:
+    """Tell whether a throttle moves in a record; that of the model stays as in trim."""
+    throttles = (record[name] for name in record.channels if "throttle" in name)
+    return any(float(np.ptp(one)) > NEGLIGIBLE for one in throttles)
+
+
 def not_judged(records: Sequence[Record]) -> str:
     """Return what the records do not show of the airframe, in a sentence; empty if one does."""
+    if all(map(is_throttled, records)):
+        return (
+            "The throttle moves, and the model's stays as in trim: speed and attitude, which show "
+            "drag and thrust, cannot be judged."
+        )
     each = [lacking(record) for record in records]
     if not all(each):
         return ""

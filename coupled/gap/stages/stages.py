@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from coupled.gap.noise.noise import Noise, between_jumps, jumps
 from coupled.gap.noise.smooth import rate_of, smoothed
-from coupled.gap.signals.conditions import asked, left, reach_of, services, trim_shift
+from coupled.gap.signals.conditions import asked, left, neutral, reach_of, services, trim_shift
 from coupled.gap.signals.drives import drifts
 from coupled.gap.signals.floors import (
     Drive,
@@ -176,9 +176,12 @@ class Reader(Reading):
         own = noise_in(self.rig, self.name_of("gradient"), gradient[ran])
         smooth = smoothed(pressure)
 
+        at = self.as_read("computed") - neutral(self) if self.schedule.curved else None
+
         def predict(rig: Rig, q: Floats = smooth) -> Floats:
             missed = self.missed.under(rig, self.control)
-            return replay_schedule(rig, self.control, q, missed=missed) * left(self)
+            made = replay_schedule(rig, self.control, q, missed=missed, computed=at)
+            return made * left(self)
 
         share, rest = share_from_source(gradient[ran], predict(self.rig, pressure)[ran])
         if share > SMALL:
@@ -195,16 +198,15 @@ class Reader(Reading):
         return [self._made("schedule", self.name_of("gradient"), gradient, predict, noisy, own)]
 
     def _loader(self) -> list[Output]:
-        force, gradient = self.pulled(), self.gradient()
-        computed, second = self.signal("computed"), self.second()
-        load_of, hosted = self.load(), hosted_by(self)
+        force, feel, computed = self.pulled(), self.feel(), self.signal("computed")
+        inputs_of, hosted = self.other_inputs(), hosted_by(self)
         smooth, own = (
             smoothed(computed, sensor := self.driving("computed")),
             self.channel_noise("computed"),
         )
         leaks = [Nodes(smoothed(other)) for other in self.partner()]
         every = self._restarts(round(PIECE_s * self.rig.frame_rate))
-        restarted = drifts(self.rig, self.control, float(np.min(gradient)))
+        restarted = drifts(self.rig, self.control, float(np.min(feel.gradient)))
         own_starts = every if restarted else self._restarts()
 
         def driven(
@@ -233,7 +235,7 @@ class Reader(Reading):
                     pull = pull + share * leaks[0].of(rig)
                 host = hosted.a_frame_late() if otherwise else hosted
                 host = host._replace(missed=self.missed.under(rig, self.control))
-                driven_by = (pull, gradient, misread + hum, load_of(rig), second, restart, host)
+                driven_by = (pull, feel, misread + hum, inputs_of(rig), restart, host)
                 moved = drive_loader(rig, self.control, *driven_by)[0]
                 return scale * sensed.along_curve(moved) + hum
 
@@ -337,7 +339,8 @@ class Reader(Reading):
                 if times:
                     moved, pulled = moved + times * noise[0].of(rig), f + times * noise[1]
                 driven_by = sensed.both(moved, pulled, computed)
-                return sensed.at_grip(drive_linkage(rig, self.control, *driven_by, others))
+                shown = drive_linkage(rig, self.control, *driven_by, others)
+                return sensed.at_grip(shown, driven_by[1])
 
             return self._judged(
                 lambda rig: without_backlash_creep(rig, self.control, at, measured), measured

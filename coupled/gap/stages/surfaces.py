@@ -3,7 +3,7 @@
 Each model has its own map from command to position, found by flying it. If the aircraft itself
 moves a surface (a yaw damper, the control laws of an F-16), the position depends on the aircraft's
 motion too. The input is then the host's command, flown through the model's laws, and the surface
-stage is not judged.
+stage is not judged. Without a command in the record, the surface is led to where it was measured.
 """
 
 from __future__ import annotations
@@ -78,9 +78,14 @@ def surface_points(rig: Rig, control: ControlName) -> Points | None:
 
     None if the aircraft's own laws move the surface.
     """
+    return _points(*_unaltered(rig), control)
+
+
+def _unaltered(rig: Rig) -> tuple[str, tuple[ControlName, ...], float]:
+    """Return the aircraft of a rig without its alterations (JSON), its controls and frame rate."""
     assert rig.flight is not None
     plain = changed(rig.flight, UNALTERED, rig.name, "flight")
-    return _points(plain.model_dump_json(), flown_by(rig), rig.frame_rate, control)
+    return plain.model_dump_json(), flown_by(rig), rig.frame_rate
 
 
 @lru_cache(maxsize=64)
@@ -163,6 +168,14 @@ def moved(
     wrong = list[Moved]()
     for control in flown_by(rig):
         name, points = surface_channel(control), surface_points(rig, control)
+        if is_led(rig, record, control):
+            level = estimate_noise(record[name])
+            smooth = smoothed(record[name])
+            error = Smoother.of(record[name]).wiener_error(level, len(smooth), rng)
+            gain = _gain_of(rig, control)
+            found.append(Moved(name, smooth, gain=gain))
+            wrong.append(Moved(name, smooth + error, gain=gain))
+            continue
         if name not in record or points is None:
             one = Moved(name, _asked(rig, record, control))
             found, wrong = [*found, one], [*wrong, one]
@@ -187,6 +200,35 @@ def moved(
         found.append(Moved(name, smooth, *given))
         wrong.append(Moved(name, smooth + error, *given))
     return found, wrong
+
+
+def is_led(rig: Rig, record: Record, control: ControlName) -> bool:
+    """Tell whether a surface that the aircraft's laws move is known by its position alone."""
+    by_position = surface_channel(control) in record and channel(control, "estimate") not in record
+    return by_position and surface_points(rig, control) is None and _gain_of(rig, control) != 0.0
+
+
+def _gain_of(rig: Rig, control: ControlName) -> float:
+    return _gain(*_unaltered(rig), control)
+
+
+@lru_cache(maxsize=64)
+def _gain(
+    flight: str, controls: tuple[ControlName, ...], rate_Hz: float, control: ControlName
+) -> float:
+    """Return how far a surface goes with its command within a frame, rad; 0 if it goes later."""
+    plain, at = Flight.model_validate_json(flight), controls.index(control)
+    surface = motion_channels(controls, flown=True).index(surface_channel(control))
+
+    def place(command: float, frames: int) -> float:
+        airframe = make_aircraft(plain, 1.0 / rate_Hz, controls, [aircraft_folder()])
+        first, second, third = (command * (i == at) for i in range(3))
+        for _ in range(frames):
+            airframe.step((first, second, third))
+        return float(airframe.motion()[surface])
+
+    once, twice = (place(SMALL, frames) - place(0.0, frames) for frames in (1, 2))
+    return once / SMALL if abs(twice - once) < SMALL * abs(once) else 0.0
 
 
 def _led(rig: Rig, record: Record, control: ControlName, trim: float) -> Floats:

@@ -60,6 +60,6 @@ def large_terms(rig: Rig, record: Record, axes: Mapping[str, str]) -> set[str]:
     controls = flown_by(rig)
     surfaces, _ = moved(rig, record, {}, np.random.default_rng(43))
     given = (rig.flight, rig.frame_rate, controls, surfaces, (RATE, *axes))
-    flown = fly_open_loop(*given, None, flown_in(record, controls, rig.frame_rate))
+    flown = fly_open_loop(*given, flown_in(record, controls, rig.frame_rate))
     values = dict(zip(axes, flown.motion[:, 1:].T, strict=True))
     return {one.term for one in shares(axes, values) if (one.share or 0.0) >= TERM_LEAST}

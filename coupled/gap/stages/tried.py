@@ -16,13 +16,14 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import replace
 from functools import cache, partial
+from itertools import product
 
 import numpy as np
 from scipy.linalg import eigh
 
 from coupled.flight.airframe import main_file
 from coupled.flight.altered import ALTERATIONS, parts_of
-from coupled.gap.effects.effect import Effect, Parameter, dotted
+from coupled.gap.effects.effect import BY_REGRESSOR, Effect, Parameter, dotted, keys_of
 from coupled.gap.effects.scales import Scales, in_scale
 from coupled.gap.noise.smooth import smoothed
 from coupled.gap.signals.output import Floats, Output, estimate_noise
@@ -41,7 +42,8 @@ from coupled.record.record import Record
 from coupled.resources import aircraft_folder
 from coupled.rig.rig import Rig
 
-OF_PLAY = "loader.play"  # its key in a rig file without the unit
+OF_PLAY = "loader.play"  # its key in a rig file without the unit, and that of its contact
+CONTACT = "loader.play_stiffness_N_per_{d}"
 ARC = "loader.arc_geometry"
 GRAVITY = "loader.gravity_N"
 PARTS = {alteration.part.name for alteration in ALTERATIONS}
@@ -57,10 +59,15 @@ def tried_effects(
     known = _of_aircraft(known, readers[0].rig, records)
     if not has_arc(readers[0].rig, control):
         known = [one for one in known if all(p.key != ARC for p in one.parameters)]
+    if not (readers[0].moved and readers[0].imposed == "computed"):
+        known = [one for one in known if [p.key for p in one.parameters] != [CONTACT]]
     known = as_judged(known, readers, outputs)
     if not _turns_far(readers):
         known = [one for one in known if all(p.key != GRAVITY for p in one.parameters)]
-    known = in_scale(known, Scales.of(readers), readers[0].rig, control)
+    scales = Scales.of(readers)
+    if scales is None or scales.regressor == 0.0:  # none, or as constant as an offset
+        known = [one for one in known if not keys_of([one]) & {*BY_REGRESSOR}]
+    known = in_scale(known, scales, readers[0].rig, control)
     if readers[0].set_points:
         known = _under_set_points(known, records, control)
     judged = {output.stage for output in outputs}
@@ -160,8 +167,8 @@ def _in_series(effects: Sequence[Effect], separate: bool) -> list[Effect]:
 def _under_motion(library: Sequence[Effect], imposed: str) -> list[Effect]:
     """Return a library for imposed motions: the linkage's effects show in the force.
 
-    Only play does where δc is `imposed`, and none that is a limit of the servo: the motion of the
-    grip is given, whatever the servo can do.
+    Only play and its contact do where δc is `imposed`, and none that is a limit of the servo: the
+    motion of the grip is given, whatever the servo can do.
     """
     found = []
     for effect in library:
@@ -171,22 +178,26 @@ def _under_motion(library: Sequence[Effect], imposed: str) -> list[Effect]:
             sensed = imposed == "deflection" and "linkage" in effect.shows_in
             found.append(replace(effect, outputs=("loader",)) if sensed else effect)
         elif plays:
-            if len(keys) == 1:
-                found.append(replace(effect, outputs=("loader",), seen=partial(_plays, plays[0])))
-        elif imposed == "deflection" and not any("servo" in k and "limit" in k for k in keys):
+            found.append(replace(effect, outputs=("loader",), seen=partial(_plays, effect)))
+        elif keys == [CONTACT] or (
+            imposed == "deflection" and not any("servo" in k and "limit" in k for k in keys)
+        ):
             found.append(replace(effect, outputs=("loader",)))
     return found
 
 
 def _plays(
-    number: Parameter, outputs: Sequence[Output], rig: Rig, control: ControlName
+    effect: Effect, outputs: Sequence[Output], rig: Rig, control: ControlName
 ) -> list[dict[str, float]]:
     """Return the backlashes with the least residual of the force, where a fit starts, by scans.
+
+    With each stiffness from which a contact starts, if the effect has one.
 
     The cost has local minima, since the jumps of a backlash move from sample to sample. The force
     is scanned once as the rig predicts it, and once with a free factor and offset: with an unknown
     damping the prediction may be far off.
     """
+    number, *contact = effect.free
     ours = [output for output in outputs if output.stage == "loader"]
     key = dotted(number.key_on(control), control)
     filed, travel = rig.controls[control].loader.play, rig.controls[control].travel
@@ -206,7 +217,12 @@ def _plays(
         fine = (best * np.linspace(0.75, 1.3, PLAYS)).tolist()
         found.append(min(fine, key=lambda play: left(play)[i]))
     alike = abs(found[1] - found[0]) < SMALL * found[0]
-    return [{number.name: play} for play in found[: 1 if alike else 2]]
+    plays = [{number.name: play} for play in found[: 1 if alike else 2]]
+    return [
+        play | {one.name: stiffness for one, stiffness in zip(contact, each, strict=True)}
+        for play in plays
+        for each in product(*(one.starts for one in contact))
+    ]
 
 
 def _beside_factor(seen: Floats, predicted: Floats) -> float:

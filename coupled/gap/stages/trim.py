@@ -161,7 +161,7 @@ def _followed(
     lefts = []
     for trim in (Trim(own, own, 0.0, there - own), Trim(there, there, 0.0)):
         surfaces, _ = moved(rig, short, {control: trim}, np.random.default_rng(43))
-        given = (rig.flight, rig.frame_rate, flown_by(rig), surfaces, names, None)
+        given = (rig.flight, rig.frame_rate, flown_by(rig), surfaces, names)
         flown = fly_open_loop(*given, flown_in(short, flown_by(rig), rig.frame_rate))
         left = np.column_stack([short[n] - flown.motion[:, i] for i, n in enumerate(names)])
         linear = _lagged(smoothed(short[surface_channel(control)]), rig.frame_rate)

@@ -31,9 +31,9 @@ def kept_warnings(notes: list[str]) -> Iterator[None]:
     """
     said, keeper = io.StringIO(), _Kept(notes)
     loggers = [logging.getLogger(), *map(logging.getLogger, logging.root.manager.loggerDict)]
-    own = [each for each in loggers if each is loggers[0] or not each.propagate]
-    for logger in own:
-        logger.addHandler(keeper)
+    before = [each.handlers for each in loggers]
+    for logger in loggers:  # instead of their own handlers, which may write to the terminal
+        logger.handlers = [keeper] if logger is loggers[0] or not logger.propagate else []
     try:
         with (
             warnings.catch_warnings(record=True, action="always") as caught,
@@ -42,7 +42,7 @@ def kept_warnings(notes: list[str]) -> Iterator[None]:
         ):
             yield
     finally:
-        for logger in own:
-            logger.removeHandler(keeper)
+        for logger, handlers in zip(loggers, before, strict=True):
+            logger.handlers = handlers
         notes += [str(each.message) for each in caught if not issubclass(each.category, OF_CODE)]
         notes += said.getvalue().splitlines()
