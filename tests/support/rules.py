@@ -18,7 +18,7 @@ from coupled.gap.findings.credibility import remainder
 from coupled.gap.search.found import Fit
 from coupled.gap.search.screen import Worth
 from coupled.gap.signals.output import Output, stage_gaps
-from coupled.gap.thresholds import DRIFT, LENGTHS, PRIOR_EFFECT
+from coupled.gap.thresholds import CERTAIN, DRIFT, LENGTHS, PRIOR_EFFECT
 
 Off = Callable[..., Any]
 Original = Callable[..., Any]
@@ -117,6 +117,10 @@ RULES = (
          "the best set is fitted again from a new presliding grid"),
     Rule("contact_once", "search.beam:_contact_values", gives({}),
          "laws of friction start from presliding parameters fitted before"),
+    Rule("determined", "search.beam:_determined", lambda original, beam, ranked: ranked[0],
+         "of alternatives below half, the first whose sizes are determined is reported"),
+    Rule("own_trim", "search.fit:_with_trim", gives(None),
+         "a fit also starts from parameters that have the record's trim", fresh=True),
     Rule("named_contact", "search.beam:_name_law_with_contact", second,
          "Coulomb friction with presliding is named presliding friction"),
     Rule("grid", "search.case:contact_start",
@@ -161,7 +165,11 @@ RULES = (
     Rule("doubted_stage", "diagnose:incredible", gives(frozenset()),
          "an incredible effect does not make a stage without output faulty"),
     Rule("incredible_rivals", "findings.answer:incredible", gives(frozenset()),
-         "mostly, not ambiguous, where only incredible effects have alternatives"),
+         "mostly, not ambiguous, where only incredible effects have alternatives", "verdict_of"),
+    Rule("alternatives_hold", "findings.answer:one_is_certain",
+         lambda original, choice, effects: frozenset(
+             e.name for e in effects if e.probability >= CERTAIN),
+         "alternatives that are certain together hold their share of a gap"),
     Rule("together", "findings.answer:_held_together", gives(0.0),
          "mostly where the certain effects hold half of all gaps together"),
 )  # fmt: skip

@@ -40,10 +40,11 @@ def verdict_of(
 
     An effect without alternative that is not certain counts as unexplained, since it may imitate
     a fault outside the library. `mostly`: residual structure remains, but the certain effects hold
-    at least `MOST` of every faulty stage's gap, or of all gaps together. With alternatives the
-    verdict is `ambiguous` if no set of effects has more than half of the probability, or an effect
-    that has them is not certain; but not if none of them is credible and the certain effects hold
-    that share.
+    at least `MOST` of every faulty stage's gap, or of all gaps together. Two alternatives that are
+    certain together hold their share: only which of them is open. With alternatives the verdict is
+    `ambiguous` if no set of effects has more than half of the probability, or an effect that has
+    them is not certain; but not if none of them is credible and the certain effects hold that
+    share.
     """
     faulty = [stage.name for stage in stages if stage.guilty]
     blamed = {step.effect.stage for step in choice.steps}
@@ -53,8 +54,9 @@ def verdict_of(
         s.guilty and (s.name not in blamed or s.unexplained) for s in stages
     )
     known = {one.stage: one for one in budget}
-    held = all(_held(known.get(name), sure) >= MOST for name in faulty)
-    if left and not held and (open_ones or _held_together(stages, known, sure) < MOST):
+    some = one_is_certain(choice, effects)
+    held = all(_held(known.get(name), some) >= MOST for name in faulty)
+    if left and not held and (open_ones or _held_together(stages, known, some) < MOST):
         return "unexplained"
     if not choice.steps:
         # A stage within a large noise floor may hide a gap.
@@ -70,6 +72,11 @@ def doubted(choice: Choice, effects: Sequence[EffectResult]) -> frozenset[str]:
     """Return the effects without alternative whose probability is below `CERTAIN`."""
     alone = {step.effect.name for step in choice.steps if not step.rivals}
     return frozenset(e.name for e in effects if e.name in alone and e.probability < CERTAIN)
+
+
+def one_is_certain(choice: Choice, effects: Sequence[EffectResult]) -> frozenset[str]:
+    """Return the effects that are certain, alone or together with their alternatives."""
+    return frozenset(effect.name for effect in effects) - incredible(choice, effects)
 
 
 def incredible(choice: Choice, effects: Sequence[EffectResult]) -> frozenset[str]:

@@ -620,18 +620,12 @@ def _choose(beam: Beam, rounds: tuple[dict[str, float], ...]) -> Choice:
     """Return the best set with each effect's posterior probability and its alternatives.
 
     The probability of an effect is the sum over the sets with it, or with a law that contains it.
-    If no set has more than half of the probability, the first whose sizes are determined stands for
-    them.
     """
     ranked = beam.ranked()
     logs = np.array([beam.log(names) for names in ranked])
     weights = np.exp(logs - logs[0])
     weights /= weights.sum()
-    best = beam.best
-    if weights[0] <= MOST:
-        near = [names for names in ranked if beam.log(names) > logs[0] - RIVAL_GAIN]
-        sure = (names for names in near if names and is_admissible(beam.problem, beam.fits[names]))
-        best = next(sure, best)
+    best = beam.best if weights[0] > MOST else _determined(beam, ranked)
     fitted = beam.fits[best]
     steps = []
     for effect in fitted.effects:
@@ -660,6 +654,13 @@ def _choose(beam: Beam, rounds: tuple[dict[str, float], ...]) -> Choice:
         rounds,
         float(weights[ranked.index(best)]),
     )
+
+
+def _determined(beam: Beam, ranked: Sequence[Names]) -> Names:
+    """Return the first of several alternatives whose sizes are determined; of none, the first."""
+    near = [names for names in ranked if beam.log(names) > beam.log(ranked[0]) - RIVAL_GAIN]
+    sure = (names for names in near if names and is_admissible(beam.problem, beam.fits[names]))
+    return next(sure, ranked[0])
 
 
 def _replaces(best: Names, other: Names, effect: Effect) -> bool:

@@ -327,6 +327,18 @@ def test_a_ulog_of_which_parts_are_damaged_says_so(tmp_path: Path) -> None:
     assert account.warnings == ()
 
 
+@pytest.mark.parametrize("kept", [60, None])
+def test_a_ulog_of_which_the_definitions_are_damaged_is_refused(
+    tmp_path: Path, kept: int | None
+) -> None:
+    """Its reader went back from the end of the file for ever, until the time limit of 20 s."""
+    formats.write_ulog(tmp_path / "a.ulg")
+    content = (tmp_path / "a.ulg").read_bytes()
+    (tmp_path / "a.ulg").write_bytes(content[:16] + b"\xff\xff\x7f" + content[19:kept])
+    with pytest.raises(InputError, match="is damaged from byte 16 on, before its data"):
+        read(tmp_path, "a.ulg", ONE.format(time="T", unit="", force="F"))
+
+
 def test_warnings_about_the_file_are_kept_and_those_about_code_are_not() -> None:
     notes: list[str] = []
     with kept_warnings(notes):

@@ -14,6 +14,7 @@ from coupled.record.importing.formats.columns import MOST_COLUMNS, Found, as_num
 STAMPS = "timestamp"
 HEAD_bytes = 16  # of the file, before its messages
 KINDS = b"ABCDFILMOPQRS"  # types of messages of the format
+BEGIN = b"ACL"  # those that end the definitions at the head of the file
 
 
 def read_ulog(path: Path, content: bytes) -> list[Found]:
@@ -21,8 +22,10 @@ def read_ulog(path: Path, content: bytes) -> list[Found]:
     if content[:7] != b"ULog\x01\x12\x35":
         raise InputError(path, "", "is no ULog file")
     columns: list[Found] = []
+    place, begun = _damage(content)
+    if place and not begun:  # without its definitions no data can be read, and pyulog may never end
+        raise InputError(path, "", f"is damaged from byte {place} on, before its data")
     log = ULog(io.BytesIO(content))
-    place = _damage(content)
     if place or log.file_corruption:  # pyulog skips or ends there without a warning
         where = f"from byte {place} on" if place else "in parts"
         warnings.warn(f"the file is damaged {where}, and rows are lost", stacklevel=1)
@@ -39,13 +42,17 @@ def read_ulog(path: Path, content: bytes) -> list[Found]:
     return columns
 
 
-def _damage(content: bytes) -> int:
-    """Return the byte of the first invalid or incomplete message; 0 in a whole file."""
-    place = HEAD_bytes
+def _damage(content: bytes) -> tuple[int, bool]:
+    """Return the byte of the first invalid or incomplete message, and whether data begin before it.
+
+    The byte is 0 in a whole file.
+    """
+    place, begun = HEAD_bytes, False
     while place < len(content):
         size = int.from_bytes(content[place : place + 2], "little")
         kind = content[place + 2 : place + 3]
         if not kind or kind not in KINDS or place + 3 + size > len(content):
-            return place
+            return place, begun
+        begun |= kind in BEGIN
         place += 3 + size
-    return 0
+    return 0, begun
