@@ -13,7 +13,7 @@ from tests.support.commands import coupled
 from tests.support.mutations import cases, mutated, write_inputs
 
 SEED = 11
-FEW, MANY = 3, 150  # changed files for each file of a command
+FEW, MANY = 3, 60  # changed files for each file of a command
 
 
 def ends_well(folder: Path, words: tuple[str, ...], capfd: pytest.CaptureFixture[str]) -> None:

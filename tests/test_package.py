@@ -24,10 +24,26 @@ def tracked(*folders: str) -> set[str]:
     return {name for name in listed.stdout.split("\0") if name}
 
 
-def test_a_wheel_holds_the_package_its_aircraft_and_runs(tmp_path: Path) -> None:
-    pip = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "-w", str(tmp_path)]
-    subprocess.run([*pip, str(ROOT)], check=True, timeout=900)
-    [wheel] = tmp_path.glob("*.whl")
+@pytest.fixture(scope="module")
+def archive(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The source distribution."""
+    folder = tmp_path_factory.mktemp("archive")
+    build = "import sys, hatchling.build; hatchling.build.build_sdist(sys.argv[1])"
+    subprocess.run([sys.executable, "-c", build, str(folder)], cwd=ROOT, check=True, timeout=300)
+    [archive] = folder.glob("*.tar.gz")
+    return archive
+
+
+@pytest.fixture(scope="module")
+def wheel(archive: Path) -> Path:
+    """The wheel, built from the source distribution; `.ci/run` builds one from the clone."""
+    pip = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "-w", str(archive.parent)]
+    subprocess.run([*pip, str(archive)], check=True, timeout=900)
+    [wheel] = archive.parent.glob("*.whl")
+    return wheel
+
+
+def test_a_wheel_holds_the_package_its_aircraft_and_runs(wheel: Path, tmp_path: Path) -> None:
     with zipfile.ZipFile(wheel) as archive:
         names = {name for name in archive.namelist() if ".dist-info/" not in name}
         archive.extractall(tmp_path / "installed")
@@ -55,10 +71,7 @@ def test_a_wheel_holds_the_package_its_aircraft_and_runs(tmp_path: Path) -> None
     assert rigs == len([n for n in names if PurePosixPath(n).match("shipped/aircraft/*/*.toml")])
 
 
-def test_a_source_distribution_holds_what_a_clone_has(tmp_path: Path) -> None:
-    build = "import sys, hatchling.build; hatchling.build.build_sdist(sys.argv[1])"
-    subprocess.run([sys.executable, "-c", build, str(tmp_path)], cwd=ROOT, check=True, timeout=300)
-    [archive] = tmp_path.glob("*.tar.gz")
+def test_a_source_distribution_holds_what_a_clone_has(archive: Path) -> None:
     with tarfile.open(archive) as files:
         names = {name.partition("/")[2] for name in files.getnames()}
     folders = ("coupled", "aircraft", "runs", "tests", "docs", "README.md", "pyproject.toml")
@@ -67,18 +80,10 @@ def test_a_source_distribution_holds_what_a_clone_has(tmp_path: Path) -> None:
     assert not {name for name in names if "__pycache__" in name or name.endswith(".pyc")}
 
 
-@pytest.mark.parametrize("kind", ["wheel", "source distribution"])
-def test_what_is_built_installs_and_flies(kind: str, tmp_path: Path) -> None:
-    source = str(ROOT)
-    if kind != "wheel":
-        build = "import sys, hatchling.build; hatchling.build.build_sdist(sys.argv[1])"
-        words = [sys.executable, "-c", build, str(tmp_path)]
-        subprocess.run(words, cwd=ROOT, check=True, timeout=300)
-        [archive] = tmp_path.glob("*.tar.gz")
-        source = str(archive)
+def test_what_is_built_installs_and_flies(wheel: Path, tmp_path: Path) -> None:
     pip = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-compile"]
     target = tmp_path / "installed"
-    subprocess.run([*pip, "--target", str(target), source], check=True, timeout=900)
+    subprocess.run([*pip, "--target", str(target), str(wheel)], check=True, timeout=900)
     cache = tmp_path / "cache"
     environment = {**os.environ, "PYTHONPATH": str(target), "NO_COLOR": "1"}
 

@@ -146,7 +146,7 @@ def _flown_losses(loss_map: LossMap, flown: Floats) -> Floats:
     greatest = float(np.max(flown[1], initial=0.0)) or float(loss_map.deflection[-1])
     with contextlib.suppress(QhullError, ValueError):
         places = np.stack((q.ravel(), d.ravel()), axis=1) / sizes.T
-        inside = Delaunay((flown / sizes).T).find_simplex(places).reshape(q.shape) >= 0
+        inside = Delaunay(_hull((flown / sizes).T)).find_simplex(places).reshape(q.shape) >= 0
     inside &= (d >= _NEUTRAL * greatest) & np.isfinite(loss_map.loss)
     return np.asarray(loss_map.loss[inside])
 
@@ -168,11 +168,16 @@ def _outline(axes: Axes, flown: Floats, factors: tuple[float, float]) -> None:
     """Draw the hull of what was flown, where it is more than a line."""
     points = np.stack((factors[0] * flown[0], factors[1] * flown[1]), axis=1)
     try:
-        corners = points[ConvexHull(points).vertices]
+        corners = _hull(points)
     except (QhullError, ValueError):
         return
     closed = np.vstack((corners, corners[:1]))
     axes.plot(closed[:, 0], closed[:, 1], color="black", linewidth=1.2)
+
+
+def _hull(points: Floats) -> Floats:
+    """Return the corners of the hull of points, shape (corners, 2)."""
+    return np.asarray(points[ConvexHull(points).vertices])
 
 
 def draw_feel(name: str, feel: Feel, system: System = "si") -> Figure:

@@ -128,10 +128,10 @@ def test_a_few_damaged_files_end_in_a_line(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_many_damaged_files_end_in_a_line(tmp_path: Path) -> None:
-    assert wrong_keys(tmp_path, 6000, seed=11) == []
-    assert wrong_seals(tmp_path, 1000, seed=12) == []
-    assert wrong_rigs(3000, seed=13) == []
-    assert wrong_runs(2000, seed=14) == []
+    assert wrong_keys(tmp_path, 2000, seed=11) == []
+    assert wrong_seals(tmp_path, 400, seed=12) == []
+    assert wrong_rigs(1000, seed=13) == []
+    assert wrong_runs(600, seed=14) == []
 
 
 BROKEN_KEY = {

@@ -93,4 +93,4 @@ def test_a_few_damaged_models_end_in_a_line(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_many_damaged_models_end_in_a_line(tmp_path: Path) -> None:
-    assert wrong(tmp_path, 200, seed=2) == []
+    assert wrong(tmp_path, 80, seed=2) == []
