@@ -33,11 +33,10 @@ from coupled.gap.effects.effect import (
 from coupled.gap.effects.library import BY_NAME, EFFECTS, LAG, SETTINGS, STAMP
 from coupled.gap.effects.linkage import SERVO
 from coupled.gap.effects.scales import Scales, in_scale
-from coupled.gap.prepare import readers_of
+from coupled.gap.prepare import as_driven, readers_of
 from coupled.gap.search.case import Case, Tell
 from coupled.gap.search.fit import fit_set
 from coupled.gap.search.found import Alike, Fit, alike
-from coupled.gap.signals.drives import as_driven
 from coupled.gap.signals.output import Output, Part
 from coupled.gap.stages.airframe import airframe_outputs
 from coupled.gap.stages.stages import Reader

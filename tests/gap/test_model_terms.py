@@ -26,8 +26,7 @@ from coupled.gap.search.beam import search_sets
 from coupled.gap.search.case import Case
 from coupled.gap.search.found import Candidate, Choice, Fit, Found
 from coupled.gap.signals.output import Output
-from coupled.gap.stages.terms import with_terms
-from coupled.gap.stages.tried import tried_effects
+from coupled.gap.stages.tried import tried_effects, with_terms
 from coupled.gap.thresholds import COURSE_GAIN
 from coupled.record.channels import LATERAL
 from coupled.record.record import Record

@@ -27,7 +27,7 @@ from coupled.gap.effects.library import BY_NAME
 from coupled.gap.findings.budget import shapley_subsets
 from coupled.gap.findings.result import labelled
 from coupled.gap.noise.smooth import smoothed
-from coupled.gap.signals.drives import drifts, softest_gradient
+from coupled.gap.signals.reading import drifts, softest_gradient
 from coupled.gap.stages.airframe import gusts_of, has_gusts
 from coupled.gap.stages.surfaces import surface_channel
 from coupled.gap.thresholds import NEGLIGIBLE, SHORT_FRAMES

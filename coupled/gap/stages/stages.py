@@ -26,7 +26,6 @@ from numpy.typing import NDArray
 from coupled.gap.noise.noise import Noise, between_jumps, jumps
 from coupled.gap.noise.smooth import rate_of, smoothed
 from coupled.gap.signals.conditions import asked, left, neutral, reach_of, services, trim_shift
-from coupled.gap.signals.drives import drifts
 from coupled.gap.signals.floors import (
     Drive,
     given_noise,
@@ -39,7 +38,7 @@ from coupled.gap.signals.floors import (
 )
 from coupled.gap.signals.live import Mask
 from coupled.gap.signals.output import HiddenGap, Output, Predict, estimate_noise, spread
-from coupled.gap.signals.reading import Reading
+from coupled.gap.signals.reading import Reading, drifts
 from coupled.gap.stages.host import Product, compensated
 from coupled.gap.stages.inputs import (
     Driven,
@@ -105,7 +104,12 @@ class Reader(Reading):
     """Builds the outputs that a record allows, and lists missing channels."""
 
     def outputs(self) -> list[Output]:
-        """Return every output that the record allows, in the order of the chain."""
+        """Return every output that the record allows, in the order of the chain.
+
+        An aircraft alone has none of these stages; the airframe's are made by `airframe_outputs`.
+        """
+        if not self.rig.controls:
+            return []
         lacking = self.missing()
         makers = {
             "schedule": self._schedule,
