@@ -32,7 +32,7 @@ from coupled.gap.effects.effect import (
 )
 from coupled.gap.effects.library import BY_NAME, EFFECTS, LAG, SETTINGS, STAMP
 from coupled.gap.effects.linkage import SERVO
-from coupled.gap.effects.scales import Scales, in_scale
+from coupled.gap.effects.settings import Scales, in_scale
 from coupled.gap.prepare import as_driven, readers_of
 from coupled.gap.search.case import Case, Tell
 from coupled.gap.search.fit import fit_set

@@ -33,7 +33,7 @@ from coupled.flight.modelparts import Thrust
 from coupled.flight.modeltext import functions_of
 from coupled.gap.effects.airframe import term
 from coupled.gap.effects.effect import BY_REGRESSOR, Effect, Parameter, dotted, keys_of
-from coupled.gap.effects.scales import Scales, in_scale
+from coupled.gap.effects.settings import Scales, in_scale
 from coupled.gap.noise.smooth import smoothed
 from coupled.gap.signals.output import Floats, Output, estimate_noise
 from coupled.gap.stages.airframe import RATE, needs
