@@ -32,15 +32,7 @@ from coupled.gap.noise.smooth import smoothed
 from coupled.gap.search.case import Case
 from coupled.gap.search.found import Fit
 from coupled.gap.signals.output import Output
-from coupled.gap.thresholds import (
-    DRIFT,
-    DRIFT_CHANCE,
-    FEW,
-    HOST_DRIFT,
-    LEAST_STRETCHES,
-    PARTLY,
-    SMALL,
-)
+from coupled.gap.thresholds import DRIFT, DRIFT_CHANCE, FEW, HOST_DRIFT, PARTLY, SMALL
 from coupled.record.record import Record
 
 Floats = NDArray[np.float64]
@@ -151,7 +143,7 @@ def _regime(by: str, parts: Sequence[tuple[Acts, Floats]], lasting: float) -> Re
         return None
     sizes = [_size(action[rows], left[rows], number[rows], lasting) for rows in (low, high)]
     (a, a_error, a_held), (b, b_error, b_held) = sizes
-    if min(a_held, b_held) < LEAST_STRETCHES:
+    if min(a_held, b_held) < 2.0:  # one has no scatter
         return None
     squares = (a_error**2, b_error**2)
     apart = squares[0] ** 2 / (a_held - 1.0) + squares[1] ** 2 / (b_held - 1.0)

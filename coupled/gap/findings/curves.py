@@ -61,12 +61,12 @@ from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points
 from coupled.gap.thresholds import (
     CERTAIN,
-    CURVE_ROUNDS,
     DRIFT_CHANCE,
     LESSER,
     MOST,
     NEGLIGIBLE,
     RIVAL_GAIN,
+    TRIES,
 )
 from coupled.parallel import in_threads
 from coupled.record.channels import ControlName, unit_of
@@ -368,7 +368,7 @@ class _Fitter:
 
     def _refined(self, basis: Basis, pick: Pick, rig: Rig) -> tuple[Basis, Pick, Rig]:
         """Return a law fitted again about its last curve, while the fit improves, and its rig."""
-        for _ in range(CURVE_ROUNDS):
+        for _ in range(TRIES):
             again = self._basis(basis.law, basis.places, basis.outputs, pick.values(basis))
             if again is None:
                 break

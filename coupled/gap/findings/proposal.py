@@ -43,15 +43,7 @@ from coupled.gap.stages.airframe import airframe_outputs
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points
 from coupled.gap.stages.tried import lacking_keys
-from coupled.gap.thresholds import (
-    COURSE_GAIN,
-    DOUBLED,
-    MOST,
-    POWER_DECADES,
-    POWER_HALVINGS,
-    FLIGHT_s,
-    PIECE_s,
-)
+from coupled.gap.thresholds import DOUBLED, FAR, MOST, RIVAL_GAIN, SMALL, FLIGHT_s, PIECE_s
 from coupled.record.channels import ControlName, channel, noisy_channels
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
@@ -186,14 +178,14 @@ def _least(
     high = 1.0
     while not shows(high):
         high *= 10.0
-        if high > 10.0**POWER_DECADES:
+        if high > FAR:
             return None
     low = high / 10.0
     while shows(low):
         low, high = low / 10.0, low
-        if low < 10.0**-POWER_DECADES:
+        if low < 1.0 / FAR:
             break
-    for _ in range(POWER_HALVINGS):
+    while high > (1.0 + SMALL) * low:
         middle = math.sqrt(low * high)
         low, high = (low, middle) if shows(middle) else (middle, high)
     return _values(effect, high, nominal, control)
@@ -353,7 +345,7 @@ def in_one_line(
     if tests_found:
         best = tests_found[0]
         one, other = map(plain, best.rivals)
-        if best.gain < COURSE_GAIN:
+        if best.gain < DOUBLED * RIVAL_GAIN:
             return (
                 f"No candidate test discriminates {one} from {other}:"
                 " this rig responds alike to both."

@@ -17,7 +17,7 @@ from coupled.gap.findings.budget import Shrink, StageBudget
 from coupled.gap.findings.result import EffectResult, Findings, ParameterEstimate, StageResult
 from coupled.gap.findings.where import Remains, Where
 from coupled.gap.noise.lines import SeenLine
-from coupled.gap.thresholds import CERTAIN, MINOR, MOST_CHANGE
+from coupled.gap.thresholds import CERTAIN, MINOR
 
 _SENTENCE = re.compile(r"(?<=\.) (?=[A-ZΑ-Ω])")
 OF_SIGNAL = {
@@ -289,7 +289,7 @@ def in_time(effect: EffectResult) -> str:
         unit = " of them" if course.kind == "events" else f" {first.unit}".rstrip()
         if course.kind != "events" and (first.relative or first.name == "per_s"):
             share, unit = share.times(100.0), " %"
-            if abs(share.value) > MOST_CHANGE:
+            if abs(share.value) > 100.0:
                 return f"{capital(plain(effect.name))}: {', '.join([*said, FAST])}."
         ends = f"{share.low:.3g} to {share.high:.3g}"
         said.append(f"at {share.value:.3g}{unit} a minute ({ends})")

@@ -25,7 +25,7 @@ from coupled.gap.effects.settings import contact, is_dry, lag_within_a_step, set
 from coupled.gap.search.course import Bounds, Timing, timed
 from coupled.gap.search.found import Fit
 from coupled.gap.signals.output import Output, stage_gaps, stage_limits
-from coupled.gap.thresholds import ELASTIC_SHARES, LENGTHS, LESSER, MINOR, MISMATCH, SEARCHED_TO
+from coupled.gap.thresholds import ELASTIC_SHARES, LENGTHS, LESSER, MINOR, MISMATCH
 from coupled.record.channels import ControlName
 from coupled.rig.rig import Rig
 
@@ -46,7 +46,7 @@ def contact_start(cost: Cost, most: float, most_elastic: float) -> tuple[float, 
 
     best = min((within(x * most, s) for x, s in product(LENGTHS, ELASTIC_SHARES)), key=cost_at)
     times, more = 1.5, 0.2
-    while times - 1.0 > SEARCHED_TO:
+    while times - 1.0 > MINOR:
         length, share = best
         longer = ((length * times, share), (length / times, share))
         softer = ((length, share + more), (length, share - more))

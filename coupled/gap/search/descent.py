@@ -31,15 +31,15 @@ from coupled.gap.thresholds import (
     DAMPING_FIRST,
     DIFFERENCE,
     DIFFERENCE_STEPS,
+    DOUBLED,
+    FEW,
     FEWER,
     FIT_ITERATIONS,
     LESSER,
     MINOR,
     MOST,
-    MOVED_LITTLE,
     NEGLIGIBLE,
     PARTLY,
-    RACE_BEHIND,
     ROUGH,
     ROUNDS,
     SLOPES_KEPT,
@@ -117,7 +117,7 @@ class Slopes:
         moved, step = here - last.residual, x - last.at
         size = _rms(moved)
         if not self._smooth or size <= TINY:
-            return last.jacobian if size <= MOVED_LITTLE else None
+            return last.jacobian if size <= FEW else None
         missed = _rms(moved - last.jacobian @ step)
         if self.corrections >= (2 * ROUNDS) or missed > ROUGH * size:
             return None
@@ -315,7 +315,7 @@ class Descent:
             return started[0]
         best = search.down(started[0].x, self.most, started[0].slope)
         for other in started[1:]:
-            behind = other.cost > RACE_BEHIND * started[0].cost
+            behind = other.cost > DOUBLED**2 * started[0].cost
             if behind or leaves_noise(best.cost, len(best.fun)):
                 break
             best = min(best, search.down(other.x, self.most, other.slope), key=lambda one: one.cost)

@@ -22,7 +22,7 @@ from coupled.gap.signals.floors import Drive, floor_from, input_noise, noise_in
 from coupled.gap.signals.live import Assumed, Live, Mask, live_of
 from coupled.gap.signals.missed import Missed, missed_in
 from coupled.gap.signals.output import Floats
-from coupled.gap.thresholds import BEGUN_AWAY, BEGUN_MOVING, SETTLE_s, SHORTEST_RECORD_s
+from coupled.gap.thresholds import MINOR, PARTLY, SETTLE_s, SHORTEST_RECORD_s
 from coupled.record.channels import SURFACES, ControlName, channel
 from coupled.record.record import Record
 from coupled.rig.crossing import leaking
@@ -175,8 +175,8 @@ class Reading:
             return False
         place = smoothed(self._measured(name))
         rate = np.gradient(place)
-        away = abs(float(place[0])) > BEGUN_AWAY * float(np.ptp(place))
-        return away or abs(float(rate[0])) > BEGUN_MOVING * float(np.std(rate))
+        away = abs(float(place[0])) > MINOR * float(np.ptp(place))
+        return away or abs(float(rate[0])) > PARTLY * float(np.std(rate))
 
     def assumed(self) -> Assumed | None:
         """Return K̂ in use, if it changed in flight."""

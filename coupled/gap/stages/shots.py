@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from coupled.gap.noise.smooth import Smoother, smoothed
 from coupled.gap.signals.output import estimate_noise
-from coupled.gap.thresholds import NEGLIGIBLE, SHOT_s
+from coupled.gap.thresholds import NEGLIGIBLE, SHORTEST_RECORD_s
 from coupled.record.record import Record
 from coupled.rig.recorder import stamped
 
@@ -42,7 +42,7 @@ class Restarts:
     @classmethod
     def of(cls, record: Record, frame_rate_Hz: float) -> Restarts | None:
         """Return the restarts of a record; None if it lacks a channel or does not last for two."""
-        every = round(SHOT_s * frame_rate_Hz)
+        every = round(SHORTEST_RECORD_s * frame_rate_Hz)
         if lacking(record) or len(record) <= every:
             return None
         names = (*NEEDS, *(one for one in BESIDE if one in record))

@@ -57,7 +57,6 @@ from coupled.gap.thresholds import (
     NEARLY_ALL,
     REPLAY_KNOWN,
     ROUNDING_SPAN,
-    SAMPLED,
     SMALL,
     TRIES,
     PIECE_s,
@@ -256,7 +255,7 @@ class Reader(Reading):
             return predicted(driven(force.with_error(k), seen), 2.0**0.5)(rig)
 
         force = self._without_answered_noise(force, computed)
-        trembling = Nodes(force.passed(np.random.default_rng(SAMPLED)))
+        trembling = Nodes(force.passed(np.random.default_rng(47)))
         answer = driven(force.smooth, smooth)
         walks = force.smooth is not force.recorded
         walks = walks and creeps(self.rig, self.control, answer, own.rms)
@@ -332,7 +331,7 @@ class Reader(Reading):
         computed, measured = self.signal("computed"), self.signal("deflection")
         command, force = self.commanded(), self.pulled()
         others = {name: smoothed(signal) for name, signal in self.others().items()}
-        rng = np.random.default_rng(SAMPLED)
+        rng = np.random.default_rng(47)
         noise = Nodes(command.passed(rng)), force.passed(rng)
 
         def driven(c: Floats, f: Floats, otherwise: bool = False) -> Predict:

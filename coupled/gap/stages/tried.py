@@ -41,13 +41,13 @@ from coupled.gap.stages.openloop import flown_in, fly_open_loop
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import flown_by, moved
 from coupled.gap.thresholds import (
-    LATERAL_MOVES,
     MISMATCH,
+    MORE,
     NEGLIGIBLE,
     PLAYS,
-    REACHED_BEYOND,
     REACHED_OVER,
     REPLAY_KNOWN,
+    SIGMAS,
     SMALL,
 )
 from coupled.record.channels import LATERAL, ControlName, channel, unit_of
@@ -147,7 +147,7 @@ def _moves(name: str, record: Record) -> bool:
     if name not in record:
         return False
     noise = estimate_noise(record[name]).rms
-    return float(np.std(record[name])) > LATERAL_MOVES * noise
+    return float(np.std(record[name])) > MORE * noise
 
 
 def as_judged(
@@ -273,7 +273,7 @@ def _reached(grip: Floats, record: Record) -> float:
     A play only makes it slower than the servo; a bend would add to it, but is not considered.
     """
     rate_Hz = (len(grip) - 1) / float(record.time_s[-1] - record.time_s[0])
-    noise = REACHED_BEYOND * estimate_noise(grip).rms
+    noise = 2.0 * SIGMAS * estimate_noise(grip).rms  # of the two ends of a way
     over = [n for n in REACHED_OVER if n < len(grip)]
     way = [float(np.max(np.abs(grip[n:] - grip[:-n]))) - noise for n in over]
     return max([rate_Hz * w / n for n, w in zip(over, way, strict=True)], default=0.0)
