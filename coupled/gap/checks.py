@@ -19,11 +19,11 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from coupled.errors import InputError, nearest
 from coupled.flight.aircraft import make_aircraft
 from coupled.flight.altered import STILL
+from coupled.gap.signals.output import Floats
 from coupled.gap.stages.airframe import RATE
 from coupled.gap.stages.surfaces import surface_channel, surface_points
 from coupled.gap.thresholds import (
@@ -55,7 +55,6 @@ from coupled.rig.rig import Rig
 from coupled.rig.rigfile import rig_from_table
 from coupled.schema import changed, file_keys
 
-Floats = NDArray[np.float64]
 SPEED = "true_airspeed_m_per_s"
 ELEVATOR = surface_channel("column")
 

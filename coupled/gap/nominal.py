@@ -18,7 +18,6 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from coupled.errors import InputError, nearest
 from coupled.gap.checks import check_record
@@ -57,7 +56,6 @@ from coupled.schema import LARGEST, Section, file_keys
 if TYPE_CHECKING:
     import polars as pl
 
-Floats = NDArray[np.float64]
 # The stage of a key by its section; keys of the loader with a prefix of `OF_LINKAGE`: linkage.
 STAGE_OF_SECTION = {
     "loader": "loader",

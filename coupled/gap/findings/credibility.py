@@ -31,11 +31,9 @@ from coupled.gap.findings.where import free_share, response, signals
 from coupled.gap.noise.smooth import smoothed
 from coupled.gap.search.case import Case
 from coupled.gap.search.found import Fit
-from coupled.gap.signals.output import Output
+from coupled.gap.signals.output import Floats, Output
 from coupled.gap.thresholds import DRIFT, DRIFT_CHANCE, FEW, HOST_DRIFT, PARTLY, SMALL
 from coupled.record.record import Record
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ from coupled.display import split_unit
 from coupled.errors import InputError
 from coupled.gap.search.evidence import misfit
 from coupled.gap.search.problem import ModelError
-from coupled.gap.signals.output import Output, Part, memory
+from coupled.gap.signals.output import Floats, Output, Part, memory
 from coupled.gap.thresholds import (
     CURVE_KINKS,
     CURVE_NODES,
@@ -41,7 +41,6 @@ from coupled.rig.curves import Curve as RigCurve
 from coupled.rig.rig import Rig
 from coupled.schema import SMALLEST, file_keys
 
-Floats = NDArray[np.float64]
 WIDTH = PRIOR_SPAN / math.sqrt(2.0 * math.pi)  # prior's width over the size (`search.evidence`)
 Values = tuple[Floats, Floats]  # nodes and values of a curve
 

@@ -19,7 +19,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from coupled.display import split_unit
 from coupled.gap.chain import BY_NAME as STAGE_OF
@@ -50,12 +49,7 @@ from coupled.gap.search.case import Case
 from coupled.gap.search.evidence import evidence, evidence_of, fewest_unexplained, misfit
 from coupled.gap.search.found import Choice, Fit
 from coupled.gap.search.problem import ModelError, Problem
-from coupled.gap.signals.output import (
-    Output,
-    explained_below,
-    stage_gaps,
-    stage_limits,
-)
+from coupled.gap.signals.output import Floats, Output, explained_below, stage_gaps, stage_limits
 from coupled.gap.signals.reading import LOAD
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points
@@ -73,8 +67,6 @@ from coupled.record.channels import ControlName, unit_of
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
 from coupled.rig.surface import share_of_travel
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,6 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from coupled.display import percent
 from coupled.errors import InputError
@@ -27,6 +26,7 @@ from coupled.gap.effects.library import BY_NAME
 from coupled.gap.findings.budget import shapley_subsets
 from coupled.gap.findings.result import labelled
 from coupled.gap.noise.smooth import smoothed
+from coupled.gap.signals.output import Floats
 from coupled.gap.signals.reading import drifts, softest_gradient
 from coupled.gap.stages.airframe import gusts_of, has_gusts
 from coupled.gap.stages.surfaces import surface_channel
@@ -36,7 +36,6 @@ from coupled.record.record import Record
 from coupled.rig.rig import Rig
 from coupled.schema import SMALLEST
 
-Floats = NDArray[np.float64]
 COMPARED = ("deflection", "computed")  # of the control, and of the motion:
 MOTION = ("pitch_rate_rad_per_s", "load_factor", "pitch_rad")
 LATERAL = ("roll_rate_rad_per_s", "yaw_rate_rad_per_s")

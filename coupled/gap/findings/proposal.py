@@ -18,7 +18,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from coupled.errors import InputError
 from coupled.gap.effects.effect import (
@@ -38,7 +37,7 @@ from coupled.gap.search.case import Case
 from coupled.gap.search.evidence import likelier_by
 from coupled.gap.search.found import Choice
 from coupled.gap.search.problem import Problem
-from coupled.gap.signals.output import Output, white
+from coupled.gap.signals.output import Floats, Output, white
 from coupled.gap.stages.airframe import airframe_outputs
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points
@@ -47,8 +46,6 @@ from coupled.gap.thresholds import DOUBLED, FAR, MOST, RIVAL_GAIN, SMALL, FLIGHT
 from coupled.record.channels import ControlName, channel, noisy_channels
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from coupled.gap.noise.lines import SeenLine, widest_line
 from coupled.gap.noise.noise import filtered, of_second_order
 from coupled.gap.noise.smooth import rate_of, smoothed
-from coupled.gap.signals.output import Output
+from coupled.gap.signals.output import Floats, Output
 from coupled.gap.thresholds import (
     BENDS,
     DOUBLED,
@@ -49,7 +49,6 @@ from coupled.record.record import Record
 from coupled.results import Plain
 from coupled.rig.rig import Rig
 
-Floats = NDArray[np.float64]
 Response = tuple[Floats, Floats]
 ALL = "all"
 

@@ -26,11 +26,10 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import chdtri
 
 from coupled.gap.effects.effect import Effect, dotted, value_of
-from coupled.gap.signals.output import Output, memory
+from coupled.gap.signals.output import Floats, Output, memory
 from coupled.gap.thresholds import (
     DOUBLED,
     ENDS,
@@ -46,7 +45,6 @@ from coupled.record.channels import ControlName
 from coupled.results import Plain
 from coupled.rig.rig import Rig
 
-Floats = NDArray[np.float64]
 Kind = Literal["constant", "changes", "from", "grows", "events"]
 
 

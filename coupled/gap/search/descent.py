@@ -22,10 +22,9 @@ from functools import partial
 from typing import Any, Literal, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
-from coupled.gap.signals.output import memory
+from coupled.gap.signals.output import Floats, memory
 from coupled.gap.thresholds import (
     DAMPING_FACTOR,
     DAMPING_FIRST,
@@ -48,7 +47,6 @@ from coupled.gap.thresholds import (
 )
 from coupled.parallel import in_threads
 
-Floats = NDArray[np.float64]
 Ends = tuple[Floats, Floats]
 
 

@@ -40,16 +40,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from coupled.gap.effects.effect import Effect, Parameter
 from coupled.gap.search.found import Fit, Group
 from coupled.gap.search.problem import ModelError, Problem
-from coupled.gap.signals.output import Output, memory
+from coupled.gap.signals.output import Floats, Output, memory
 from coupled.gap.thresholds import PRIOR_EFFECT, PRIOR_NUMBER, PRIOR_SPAN
 from coupled.rig.rig import Rig
-
-Floats = NDArray[np.float64]
 
 
 def misfit(square: Floats, smooth: Floats | float = 1.0) -> Floats:

@@ -18,10 +18,9 @@ from numpy.typing import NDArray
 from scipy.special import chdtri, stdtrit
 
 from coupled.gap.search.descent import End
-from coupled.gap.signals.output import memory
+from coupled.gap.signals.output import Floats, memory
 from coupled.gap.thresholds import DOUBLED, EDGE_BISECTIONS, LEAST_MEMORIES
 
-Floats = NDArray[np.float64]
 Numbers = NDArray[np.intp]
 
 

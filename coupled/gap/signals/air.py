@@ -28,18 +28,16 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.polynomial import Polynomial
-from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 from scipy.linalg import solveh_banded
 
 from coupled.gap.noise.smooth import Smoother, rate_of, smoothed
-from coupled.gap.signals.output import estimate_noise, white
+from coupled.gap.signals.output import Floats, estimate_noise, white
 from coupled.gap.thresholds import FIRST_ROWS, STIFFEST_AIR
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
 from coupled.units import GRAVITY_m_per_s2
 
-Floats = NDArray[np.float64]
 LOAD = "load_factor"
 NEEDS = ("alpha_rad", "pitch_rad", "true_airspeed_m_per_s", "altitude_m")
 _LATERAL = ("sideslip_rad", "roll_rad", "heading_rad")

@@ -14,17 +14,16 @@ from collections.abc import Mapping
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from coupled.errors import InputError
 from coupled.flight.conditions import Conditions, build_conditions, condition_wrappers
 from coupled.flight.event import trim_moved
 from coupled.flight.wrapper import Wrapper
+from coupled.gap.signals.output import Floats
 from coupled.record.channels import ControlName, channel
 from coupled.record.record import Record
 from coupled.rig.serving import ServiceRows, service_rows
 
-Floats = NDArray[np.float64]
 FILE = "the manifest"
 
 

@@ -26,6 +26,7 @@ from scipy.interpolate import CubicSpline
 from scipy.ndimage import median_filter
 
 from coupled.errors import InputError
+from coupled.gap.signals.output import Floats
 from coupled.gap.thresholds import (
     MOST,
     NEGLIGIBLE,
@@ -51,7 +52,6 @@ from coupled.record.channels import (
 )
 from coupled.record.record import Record
 
-Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 HARDWARE = ("bend", "friction", "breakout")  # switches of a simulated loader
 HOSTED = ("assumed_bend", "deflection", "gradient")  # switches of the host's compensation

@@ -37,7 +37,7 @@ from coupled.gap.signals.floors import (
     with_error,
 )
 from coupled.gap.signals.live import Mask
-from coupled.gap.signals.output import HiddenGap, Output, Predict, estimate_noise, spread
+from coupled.gap.signals.output import Floats, HiddenGap, Output, Predict, estimate_noise, spread
 from coupled.gap.signals.reading import Reading, drifts
 from coupled.gap.stages.host import Product, compensated
 from coupled.gap.stages.inputs import (
@@ -73,7 +73,6 @@ from coupled.rig.replay import (
 from coupled.rig.rig import Rig
 from coupled.rig.serving import held_force
 
-Floats = NDArray[np.float64]
 STEPPED = ("loader", "linkage")  # stages that run at the loader's own steps
 
 
