@@ -134,7 +134,7 @@ def _check_channels(rig: Rig, record: Record, control: ControlName, file: object
                 file, name, f"reaches {most:.3g}, beyond {travel:g}: is it in another unit?"
             )
     _check_signs(rig, record, control, file)
-    _check_force_unit(rig, record, control, file)
+    _check_force_unit(record, control, file)
     _check_schedule(rig, record, control, file)
 
 
@@ -217,7 +217,7 @@ def start_of(record: Record, name: str) -> float:
     return float(np.median(record[name][:SHORT_FRAMES]))
 
 
-def _check_force_unit(rig: Rig, record: Record, control: ControlName, file: object) -> None:
+def _check_force_unit(record: Record, control: ControlName, file: object) -> None:
     """Raise InputError if the force, by gradient and deflection, is in pounds."""
     names = [channel(control, q) for q in ("force", "computed", "gradient")]
     if any(name not in record for name in names):

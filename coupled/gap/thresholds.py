@@ -80,7 +80,7 @@ FAULTY_FROM = 1.2  # tolerance: records of the independent twin without an effec
 SMOOTHING_LOST = 0.15  # tolerance: gap from smoothing at kinks of an input, as of q̄ ramps
 CHANGE_CHANCE = 0.02  # error rate: by all features of a healthy record together (docs/diagnosis.md)
 
-# What drives a machine (`drives`, `tried`).
+# The speed that a grip reached (`tried`).
 REACHED_OVER = (2, 3, 4, 6, 8, 12)  # step: frames over which a speed is computed; chosen
 
 # Inputs of the stages (`stages`, `airframe`, `surfaces`, `trim`).
@@ -107,7 +107,7 @@ LENGTHS = (0.03, 0.1, 0.3, 0.8)  # step: presliding lengths, of the largest one;
 ELASTIC_SHARES = (0.0, 0.3, 0.6, 0.9)  # shares, where the search starts; chosen
 CLOCK_s = 5e-4  # tolerance of a recorder's time stamps; ablated
 
-# The scale of a machine (`scales`).
+# The scale of a machine (`settings`).
 COLUMN_FORCE_N = 20.0  # prior: RMS force; ablated
 COLUMN_WAY = {"m": 0.03, "rad": 0.3}  # prior: RMS motion of a column, a wheel; chosen
 OTHER_SCALE = 5.0  # prior: from which bounds are rescaled, and reach; ablated
@@ -159,12 +159,12 @@ ONSET_CHANCE = 1e-3  # error rate: of excitation alone leaving all quiet before
 ONSETS_s = 0.1  # step: between onsets that are tried, and half of it about the best
 ENDS = 3  # step: windows at the ends of a history, without onset; ablated
 
-# What a model free in form takes (`flexible`).
+# What a model free in form takes (`where`).
 BENDS = (0.02, 0.1, 0.3, 0.5, 0.7, 0.9, 0.98)  # step: quantiles where it may bend; chosen
 LAGS_s = (0.03, 0.1, 0.3, 1.0)  # step: of the copies of a signal; from reversals of motion; ablated
 RIDGES = tuple(10.0**k for k in range(-7, 3))  # step; held-out stretches decide among them
 
-# How far a gap shrinks, what would have shown, and the next test (`budget`, `power`, `proposal`).
+# How far a gap shrinks, what would have shown, and the next test (`budget`, `proposal`).
 MOST_PLAYERS = 5  # step: of Shapley, 32 subsets; more effects are averaged over first and last
 BOOTSTRAPS = 400  # step: draws of an interval; ablated
 FEW_STRETCHES = 8  # step: too few stretches for an interval; chosen
@@ -189,7 +189,7 @@ PRIOR_NUMBER = 1.0  # −ln of the prior of a law by each parameter beyond the f
 PRIOR_SPAN = 9.2  # prior: ln 10⁴; over four decades a size is equally likely in each
 VERY_STRONG = 5.0  # error rate: log evidence, 2 ln B > 10 (Kass and Raftery 1995)
 
-# What moves, short records, and the airframe (`parts`, `checks`, `shots`, `surfaces`, `terms`).
+# Short records, and the airframe (`checks`, `airframe`, `trim`).
 OTHER_ALTITUDE_m = 100.0  # tolerance: of the trim's altitude; 1 % of the air's density
 SHORT_SWINGS = 4  # error rate: of a short record: both halves hold motion in both directions
 SHOT_TRIES = 3  # step: samples of the error of restarts, of which each segment has one; chosen

@@ -143,9 +143,13 @@ class Parameter:
 
     def error(self, value: float, rig: Rig, control: ControlName) -> float:
         """Return the smallest standard error of a value, from its model error."""
-        none = self.base(rig, control) if self.above else self.neutral(rig, control)
-        size = abs(value) if self.is_limit else abs(value - none)
+        size = self.size(value, rig, control)
         return hypot(self.model_error.relative * size, self.model_error.absolute)
+
+    def size(self, value: float, rig: Rig, control: ControlName) -> float:
+        """Return how far a value is from that without an effect; of a limit, the value itself."""
+        none = self.base(rig, control) if self.above else self.neutral(rig, control)
+        return abs(value) if self.is_limit else abs(value - none)
 
     def neutral(self, rig: Rig, control: ControlName) -> float:
         """Return the value that leaves the rig's value unchanged."""

@@ -57,7 +57,7 @@ def settings(rig: Rig, control: ControlName, outputs: Sequence[Output] = ()) -> 
     }
 
 
-def lag_within_a_step(rig: Rig, control: ControlName) -> Effect:
+def lag_within_a_step(rig: Rig) -> Effect:
     """Return a delay of the force on the loader as a nuisance parameter, at most one step.
 
     If a simulated hand and loader exchange force and motion once per step of the loader, the force

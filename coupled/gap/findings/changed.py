@@ -63,7 +63,7 @@ class Interval:
 
     `scatter` is the standard deviation between healthy records, `limit` the difference that chance
     exceeds with the probability of the test, `shown` the change that the test shows with
-    probability `CHANGE_SHOWN`; both infinite with fewer than two healthy records.
+    probability `NEARLY_ALL`; both infinite with fewer than two healthy records.
     """
 
     difference: float

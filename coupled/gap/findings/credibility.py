@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtr, stdtrit
 
-from coupled.gap.effects.effect import Effect, touched
+from coupled.gap.effects.effect import Effect
 from coupled.gap.findings.where import free_share, response, signals
 from coupled.gap.noise.smooth import smoothed
 from coupled.gap.search.case import Case
@@ -246,12 +246,7 @@ def credibility(
     effect: Effect, case: Case, found: Fit, records: Sequence[Record], remains: float
 ) -> Credibility:
     """Return an effect's credibility; `remains` is the weight of the residual (`remainder`)."""
-    without = case.with_only(found, [other for other in found.effects if other is not effect])
-    acts = []
-    for output in touched(case.outputs, [effect]):
-        left = output.residual(found.rig)
-        action = output.residual(without) - left
-        acts.append(Acts(output, records[output.record], action, left))
+    acts = [Acts(one, records[one.record], *each) for one, *each in case.actions(found, effect)]
     plain = Credibility(effect.name, regimes(case, acts), remainder=remains)
     if effect.stage == "schedule":
         return replace(plain, exact=True)

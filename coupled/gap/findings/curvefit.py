@@ -29,6 +29,7 @@ from coupled.gap.thresholds import (
     CURVE_KINKS,
     CURVE_NODES,
     CURVE_PLACES,
+    NORMAL_95,
     PRIOR_EFFECT,
     PRIOR_NUMBER,
     PRIOR_SPAN,
@@ -301,7 +302,7 @@ class Pick:
     def errors(self, basis: Basis) -> Floats:
         """Return half of the 95 % interval of each value."""
         found = np.zeros(len(self.at))
-        half = 1.96 * UNDERSTATED * np.sqrt(np.diag(self.known.covariance))
+        half = NORMAL_95 * UNDERSTATED * np.sqrt(np.diag(self.known.covariance))
         found[basis.free[list(self.at)]] = half
         return found
 

@@ -209,7 +209,10 @@ class _Fitter:
         ]
         if not flown:
             return None
-        gains = [pick.known.rest + self._raised(basis, rig) for basis, pick, rig in flown]
+        gains = [
+            pick.known.rest + self._likelihood(basis, rig) - self._likelihood(basis, self.rig)
+            for basis, pick, rig in flown
+        ]
         first = next(k for k, gain in enumerate(gains) if gain > max(gains) - RIVAL_GAIN)
         basis, pick, fitted = self._refined(*flown[first])
         line = straight(basis, basis.sums("fitted"))
@@ -226,10 +229,6 @@ class _Fitter:
     def _gain(self, basis: Basis, pick: Pick) -> float:
         """Return the log evidence of a law's linear model, less that without a curve."""
         return pick.known.log - self._likelihood(basis, self.rig)
-
-    def _raised(self, basis: Basis, rig: Rig) -> float:
-        """Return the log likelihood of a rig, less that without a curve."""
-        return self._likelihood(basis, rig) - self._likelihood(basis, self.rig)
 
     def _beats_effects(self, rig: Rig, pick: Pick) -> bool:
         """Tell whether a curve has more evidence than the effects found, and than none."""

@@ -110,7 +110,7 @@ def _rate(output: Output) -> float:
 def tolerances(case: Case, found: Fit) -> dict[str, float]:
     """Return the tolerances of the fitted parameters by key, in the keys' units.
 
-    They are `HEALTHY_SIGMAS` standard deviations between records. For a single record they are
+    They are `SIGMAS` standard deviations between records. For a single record they are
     those between its halves, and at least a share of the effect, as both halves have one motion.
     """
     numbers = sorted({output.record for output in case.outputs})

@@ -22,7 +22,6 @@ import numpy as np
 from coupled.errors import InputError
 from coupled.gap.effects.effect import (
     Effect,
-    Parameter,
     apply,
     keys_of,
     possible,
@@ -113,16 +112,10 @@ def _values(effect: Effect, size: float, nominal: Rig, control: ControlName) -> 
         elif p.is_limit:
             value = start / size
         else:
-            value = _base(p, nominal, control) + size * start
+            filed = value_of(nominal, control, p.above or p.key) if p.mode == "value" else 0.0
+            value = float(filed) + size * start
         values[effect.value_key(p)] = float(np.clip(value, p.low, p.high))
     return values
-
-
-def _base(p: Parameter, nominal: Rig, control: ControlName) -> float:
-    """Return the value from which a parameter's size counts."""
-    if p.mode != "value":
-        return 0.0
-    return float(value_of(nominal, control, p.above or p.key))
 
 
 def _signature(
@@ -221,7 +214,8 @@ def next_tests(
         return ()
     rival = step.rivals[0]
     others = tuple(effect for effect in choice.fit.effects if effect is not step.effect)
-    noise = {name: white(record[name]) for name in _noisy(nominal, record)}
+    channels = noisy_channels(list(nominal.controls), flown=nominal.flight is not None)
+    noise = {name: white(record[name]) for name in channels if name in record}
     found = []
     pair = ((*others, rival.effect), (*others, step.effect))
     of_air = all(effect.stage == "airframe" for effects in pair for effect in effects)
@@ -249,11 +243,6 @@ def _as_flown(rig: Rig, test: Rig, control: ControlName) -> Rig:
     freed = [p.key for effect in EFFECTS for p in effect.parameters if p.key.startswith("flight.")]
     kept = {key: value_of(rig, control, key) for key in (*freed, "flight.terms")}
     return rig.changed({"flight": test.flight}).changed(kept)
-
-
-def _noisy(rig: Rig, record: Record) -> list[str]:
-    channels = noisy_channels(list(rig.controls), flown=rig.flight is not None)
-    return [name for name in channels if name in record]
 
 
 def _gain(

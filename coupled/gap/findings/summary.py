@@ -261,7 +261,7 @@ def _since(found: Findings) -> str:
 
 def _between(stage: str, where: Where) -> list[str]:
     """Return onset and end of a stage's gap, if it is not there all the time."""
-    begins, ends = (f"{span.at_s:.1f} s" if span else "" for span in (where.begins, where.ends))
+    begins, ends = (f"{span.value:.1f} s" if span else "" for span in (where.begins, where.ends))
     if begins and ends:
         return [f"The gap in the {stage} is there from {begins} to {ends}."]
     if begins:

@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any, Literal, Protocol
+from typing import Any, Literal
 
 import numpy as np
 from scipy.optimize import lsq_linear
@@ -102,10 +102,6 @@ class Slopes:
             self.last, self.corrections = Slope(x.copy(), here, jacobian), 0
             self.sure = True
         return jacobian
-
-    def renew(self) -> None:
-        """Discard the last Jacobian, so that differences are taken next."""
-        self.last = None
 
     def _still_good(self, x: Floats, here: Floats) -> Floats | None:
         """Return the last Jacobian, corrected if need be; None if it no longer holds."""
@@ -235,16 +231,6 @@ def _step(
     return step, 0.5 * float(against @ against - after @ after)
 
 
-class Residual(Protocol):
-    """The residual in noise floors as a function of scaled parameters.
-
-    `coarse`: with coarse steps of the loader. `rough`: approximate, for derivatives.
-    """
-
-    def __call__(self, scaled: Floats, coarse: bool = False, rough: bool = False) -> Floats:
-        """Return the residual, shape (frames,)."""
-
-
 @dataclass(frozen=True)
 class End:
     """The result of least squares: scaled parameters, residual and Jacobian.
@@ -280,7 +266,7 @@ class Descent:
 
     def end(
         self,
-        residual: Residual,
+        residual: Callable[..., Floats],
         firsts: Sequence[Floats],
         ends: Ends,
         stepped: bool,
@@ -288,7 +274,9 @@ class Descent:
     ) -> End:
         """Return the best minimum from several starts, between the bounds `ends`.
 
-        If nothing is `stepped` finer than the frames, the second phase is skipped. With a single
+        `residual` returns the residual in noise floors, shape (frames,), by scaled parameters; with
+        `coarse` by coarse steps of the loader, with `rough` approximately, for derivatives. If
+        nothing is `stepped` finer than the frames, the second phase is skipped. With a single
         start, `slope` may be the Jacobian of another fit that ended there.
         """
         near, sloping = partial(residual, coarse=True), partial(residual, coarse=True, rough=True)
@@ -364,7 +352,7 @@ class _Search:
             misled = found.rejected and slopes.corrections > 0
             if (slopes.sure and not misled) or most < 1:
                 break
-            slopes.renew()
+            slopes.last = None  # so that differences are taken next
             x0 = found.x
         known = None if slopes.last is None or misled else slopes.last.kept()
         return End(found.x, found.cost, found.fun, found.jac, known)

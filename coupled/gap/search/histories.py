@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from coupled.gap.effects.effect import Effect, touched
+from coupled.gap.effects.effect import Effect
 from coupled.gap.search.beam import search_sets
 from coupled.gap.search.case import Case
 from coupled.gap.search.course import Bounds, Course, course_of, course_of_events, timing_of
@@ -121,11 +121,8 @@ def in_time(effect: Effect, case: Case) -> Case | None:
 
 def _parts(effect: Effect, case: Case, found: Fit) -> dict[int, Parts]:
     """Return {record: (action of an effect, residual) of each output}, in noise floors."""
-    without = case.with_only(found, [other for other in found.effects if other is not effect])
     parts: dict[int, Parts] = {}
-    for output in touched(case.outputs, [effect]):
-        left = output.residual(found.rig)
-        action = output.residual(without) - left
+    for output, action, left in case.actions(found, effect):
         parts.setdefault(output.record, []).append((action, left))
     return parts
 

@@ -96,12 +96,10 @@ class Problem:
         """
         freed = {p.key for effect in effects for p in effect.parameters}
         free = list(self.nuisances)
-        if any(e.dry for e in effects) or is_dry(self.case.nominal, self.case.control):
-            free += [one for one in self.case.contact if self._may_yield(one, effects)]
+        dry = any(e.dry for e in effects)
+        if dry or is_dry(self.case.nominal, self.case.control):
+            free += [one for one in self.case.contact if dry or self.case.is_open(one)]
         return [one for one in free if freed.isdisjoint(p.key for p in one.free)]
-
-    def _may_yield(self, contact: Effect, effects: Sequence[Effect]) -> bool:
-        return any(e.dry for e in effects) or self.case.is_open(contact)
 
     def fit(
         self,

@@ -17,7 +17,6 @@ import numpy as np
 from coupled.gap.noise.lines import projected
 from coupled.gap.noise.noise import Noise, noise_of
 from coupled.gap.noise.smooth import smoothed
-from coupled.gap.signals.conditions import left
 from coupled.gap.signals.floors import Drive, floor_from, input_noise, noise_in
 from coupled.gap.signals.live import Assumed, Live, Mask, live_of
 from coupled.gap.signals.missed import Missed, missed_in
@@ -33,6 +32,7 @@ from coupled.rig.parameters import Schedule, Sensing
 from coupled.rig.recorder import stamped
 from coupled.rig.replay import replay_schedule
 from coupled.rig.rig import Rig
+from coupled.rig.serving import ServiceRows, service_rows
 
 
 @dataclass(frozen=True)
@@ -349,12 +349,34 @@ class Reading:
             return [PRESSURE]
         return [own]
 
+    def services(self) -> ServiceRows | None:
+        """Return the rows of trim, autopilot and stick pusher; None if the record has none.
+
+        They are no effect, and act in the replay as recorded, in the stages on which they acted.
+        """
+        return service_rows(self.record, self.control)
+
+    def feel_left(self) -> Floats | float:
+        """Return the share of G_T that remains after a failure of the artificial feel."""
+        rows = self.services()
+        return 1.0 if rows is None else 1.0 - rows.feel_lost
+
+    def neutral(self) -> Floats | float:
+        """Return the deflection about which F_mod acts, d."""
+        rows = self.services()
+        return 0.0 if rows is None else rows.neutral
+
+    def asked(self) -> Floats:
+        """Return the command of the surface, d: δ̂, or as changed by a jam or the other side."""
+        rows = self.services()
+        return self.as_read("estimate") if rows is None else rows.asked
+
     def feel(self) -> Feel:
         """Return what the host specified: G_T as recorded, else of the nominal schedule at q̄.
 
         G_T beyond the break is never recorded, and a curve is always that of q̄.
         """
-        own, share, schedule = self.name_of("gradient"), left(self), self.schedule
+        own, share, schedule = self.name_of("gradient"), self.feel_left(), self.schedule
         pressure = np.full(len(self.record), schedule.dynamic_pressure[0])
         if PRESSURE in self.record:
             pressure = smoothed(self.record[PRESSURE])

@@ -178,7 +178,7 @@ class Imposed:
         """Return a prediction with a small weight where the force jumps within a frame.
 
         A backlash that closes within a frame gives a sample between the forces before and after.
-        Only the share `JUMP_COUNTED` of the difference counts, which still guides a fit.
+        Only the share `LESSER` of the difference counts, which still guides a fit.
         """
         around = np.stack((np.roll(predicted, 1), np.roll(predicted, -1)))
         held = np.clip(self._reading.signal("force"), around.min(axis=0), around.max(axis=0))

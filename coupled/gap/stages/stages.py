@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from coupled.gap.noise.noise import Noise, between_jumps, jumps
 from coupled.gap.noise.smooth import rate_of, smoothed
-from coupled.gap.signals.conditions import asked, left, neutral, reach_of, services, trim_shift
+from coupled.gap.signals.conditions import reach_of, trim_shift
 from coupled.gap.signals.floors import (
     Drive,
     given_noise,
@@ -94,7 +94,7 @@ def hosted_by(reading: Reading) -> Hosted:
     held = held_force(reading.rig, reading.record, reading.control)
     assumed = reading.assumed()
     more = None if assumed is None else assumed.gradient
-    return Hosted(services(reading), None, held, reach_of(reading.record, reading.control), more)
+    return Hosted(reading.services(), None, held, reach_of(reading.record, reading.control), more)
 
 
 @dataclass(frozen=True)
@@ -178,12 +178,12 @@ class Reader(Reading):
         own = noise_in(self.rig, self.name_of("gradient"), gradient[ran])
         smooth = smoothed(pressure)
 
-        at = self.as_read("computed") - neutral(self) if self.schedule.curved else None
+        at = self.as_read("computed") - self.neutral() if self.schedule.curved else None
 
         def predict(rig: Rig, q: Floats = smooth) -> Floats:
             missed = self.missed.under(rig, self.control)
             made = replay_schedule(rig, self.control, q, missed=missed, computed=at)
-            return made * left(self)
+            return made * self.feel_left()
 
         share, rest = share_from_source(gradient[ran], predict(self.rig, pressure)[ran])
         if share > SMALL:
@@ -373,7 +373,7 @@ class Reader(Reading):
         if points is None:
             return []
         commands_at, positions = points
-        estimate, measured = asked(self), self.record[self.surface]
+        estimate, measured = self.asked(), self.record[self.surface]
         trim = trim_of(self.rig, self.record, self.control)
         filed = filed_trim(self.rig, self.control)
         held = 0.0 if trim is None else about(trim.position, filed, points)

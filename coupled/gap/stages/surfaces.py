@@ -128,10 +128,8 @@ def _moves_itself(
 
 def filed_trim(rig: Rig, control: ControlName) -> float:
     """Return a surface's position in the trim to which `surface_points` refers, rad."""
-    assert rig.flight is not None
-    plain = changed(rig.flight, UNALTERED, rig.name, "flight")
-    controls = flown_by(rig)
-    return _trim(plain.model_dump_json(), controls, rig.frame_rate)[controls.index(control)]
+    flight, controls, rate_Hz = _unaltered(rig)
+    return _trim(flight, controls, rate_Hz)[controls.index(control)]
 
 
 def own_trim(rig: Rig, control: ControlName) -> float:
