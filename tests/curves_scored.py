@@ -33,9 +33,8 @@ from coupled.blind.trials.make import record_name
 from coupled.blind.trials.rigs import rig_pool
 from coupled.blind.trials.trial import Plan, draw_trial
 from coupled.blind.twin.setting import csv_text
-from coupled.gap.diagnose import findings
+from coupled.gap.diagnose import findings, parts_of
 from coupled.gap.findings.diagnosis import PartDiagnosis
-from coupled.gap.parts import parts_of
 from coupled.gap.prepare import prepare
 from coupled.gap.search.histories import search
 from coupled.record.record import read_record

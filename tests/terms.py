@@ -19,7 +19,7 @@ from coupled.flight.modeltext import functions_of
 from coupled.gap.diagnose import diagnose
 from coupled.gap.findings.diagnosis import Diagnosis
 from coupled.gap.findings.flown import fly_force
-from coupled.gap.stages.terms import large_terms
+from coupled.gap.stages.tried import large_terms
 from coupled.resources import shipped_rigs
 from coupled.rig.rigfile import read_rig
 from tests.support.airframes import flown, motion_of, noisy, pulses

@@ -4,6 +4,11 @@ Clock, values, sensors and units of a record are checked before its diagnosis. A
 a machine. The trim of its aircraft (speed, altitude, flight path, flaps) is a condition of the
 flight and no fault, so it is taken from the record. Other values of a manifest's rig (a mass, a
 moment, a bend) are not used.
+
+Of a rig without controls, an aircraft alone, records of control forces and of the host are ignored.
+The rig takes the frame rate of the record, since no loader or host depends on it. If the record is
+slower than the rig, the model is stepped at least at the rig's rate, and the surfaces are
+interpolated between the rows.
 """
 
 from __future__ import annotations
@@ -14,11 +19,13 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from coupled.errors import InputError, nearest
 from coupled.flight.aircraft import make_aircraft
 from coupled.flight.altered import STILL
+from coupled.gap.signals.output import Floats
+from coupled.gap.stages.airframe import RATE
+from coupled.gap.stages.surfaces import surface_channel, surface_points
 from coupled.gap.thresholds import (
     DOUBLED,
     NEGLIGIBLE,
@@ -30,7 +37,14 @@ from coupled.gap.thresholds import (
     OTHER_ALTITUDE_m,
     SHORTEST_RECORD_s,
 )
-from coupled.record.channels import ControlName, channel, motion_channels
+from coupled.record.channels import (
+    LATERAL,
+    LONGITUDINAL,
+    TIME,
+    ControlName,
+    channel,
+    motion_channels,
+)
 from coupled.record.importing import plausible
 from coupled.record.record import Record
 from coupled.resources import aircraft_folder
@@ -41,8 +55,8 @@ from coupled.rig.rig import Rig
 from coupled.rig.rigfile import rig_from_table
 from coupled.schema import changed, file_keys
 
-Floats = NDArray[np.float64]
 SPEED = "true_airspeed_m_per_s"
+ELEVATOR = surface_channel("column")
 
 
 def check_record(
@@ -120,7 +134,7 @@ def _check_channels(rig: Rig, record: Record, control: ControlName, file: object
                 file, name, f"reaches {most:.3g}, beyond {travel:g}: is it in another unit?"
             )
     _check_signs(rig, record, control, file)
-    _check_force_unit(rig, record, control, file)
+    _check_force_unit(record, control, file)
     _check_schedule(rig, record, control, file)
 
 
@@ -203,7 +217,7 @@ def start_of(record: Record, name: str) -> float:
     return float(np.median(record[name][:SHORT_FRAMES]))
 
 
-def _check_force_unit(rig: Rig, record: Record, control: ControlName, file: object) -> None:
+def _check_force_unit(record: Record, control: ControlName, file: object) -> None:
     """Raise InputError if the force, by gradient and deflection, is in pounds."""
     names = [channel(control, q) for q in ("force", "computed", "gradient")]
     if any(name not in record for name in names):
@@ -355,3 +369,44 @@ def _trim_speed(flight: str, rate_Hz: float) -> float:
     still = Flight.model_validate_json(flight)
     airframe = make_aircraft(still, 1.0 / rate_Hz, ["column"], [aircraft_folder()])
     return airframe.motion()[motion_channels(["column"], flown=True).index(SPEED)]
+
+
+def motion_alone(records: Mapping[str, Record]) -> dict[str, Record]:
+    """Return the records with time, surface positions and motion only.
+
+    Raises InputError if one lacks the elevator position or the pitch rate.
+    """
+    found = {}
+    for file, record in records.items():
+        for name in (ELEVATOR, RATE):
+            if name not in record:
+                problem = "is missing; the rig has an aircraft only, and is judged by it"
+                raise InputError(file, name, problem)
+        kept = [name for name in (TIME, *LONGITUDINAL, *LATERAL) if name in record]
+        data = np.column_stack([record[name] for name in kept])
+        found[file] = Record(tuple(kept), data, record.manifest)
+    return found
+
+
+def at_rate_of(rig: Rig, record: Record) -> Rig:
+    """Return the rig with the frame rate of a record, and steps per frame to match its own."""
+    assert rig.flight is not None
+    rate_Hz = 1.0 / float(np.median(np.diff(record.time_s)))
+    if abs(rate_Hz / rig.frame_rate - 1.0) <= TINY:
+        return rig
+    wanted = rig.frame_rate * rig.flight.steps_per_frame / rate_Hz
+    steps = max(1, math.ceil(wanted - 0.01))
+    return rig.changed(
+        {"frame_rate_Hz": float(f"{rate_Hz:.6g}"), "flight.steps_per_frame": min(steps, 100)}
+    )
+
+
+def check_moved_by_pilot(rig: Rig) -> None:
+    """Raise InputError if control laws of the model move its elevator."""
+    assert rig.flight is not None
+    if surface_points(rig, "column") is None:
+        problem = (
+            "has control laws that move its elevator, which follow the column's command;"
+            " give a rig with [controls.column], and a record with column_estimate_m"
+        )
+        raise InputError(rig.name, "flight.model", f"{rig.flight.model} {problem}")

@@ -15,10 +15,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from coupled.errors import InputError, nearest
 from coupled.gap.checks import check_record
@@ -32,15 +31,13 @@ from coupled.gap.effects.effect import (
 )
 from coupled.gap.effects.library import BY_NAME, EFFECTS, LAG, SETTINGS, STAMP
 from coupled.gap.effects.linkage import SERVO
-from coupled.gap.effects.scales import Scales, in_scale
-from coupled.gap.prepare import readers_of
+from coupled.gap.effects.settings import Scales, in_scale
+from coupled.gap.prepare import as_driven, readers_of
 from coupled.gap.search.case import Case, Tell
 from coupled.gap.search.fit import fit_set
 from coupled.gap.search.found import Alike, Fit, alike
-from coupled.gap.signals.drives import as_driven
 from coupled.gap.signals.output import Output, Part
 from coupled.gap.stages.airframe import airframe_outputs
-from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.tried import as_judged
 from coupled.gap.thresholds import (
     FAR,
@@ -51,14 +48,13 @@ from coupled.gap.thresholds import (
 )
 from coupled.record.channels import ControlName, unit_of
 from coupled.record.record import Record
-from coupled.results import TableResult, frame_of
+from coupled.results import Plain, TableResult, frame_of
 from coupled.rig.rig import Rig
 from coupled.schema import LARGEST, Section, file_keys
 
 if TYPE_CHECKING:
     import polars as pl
 
-Floats = NDArray[np.float64]
 # The stage of a key by its section; keys of the loader with a prefix of `OF_LINKAGE`: linkage.
 STAGE_OF_SECTION = {
     "loader": "loader",
@@ -219,30 +215,19 @@ class Number:
 
 
 @dataclass(frozen=True)
-class ChannelFit:
+class ChannelFit(Plain):
     """The prediction error of a channel on held-out stretches, rms in its unit.
 
     `before` is the error with the rig file, `after` with the fitted rig, `floor` the noise floor,
     and `moves` the standard deviation of the channel.
     """
 
-    file: str
+    record: str
     channel: str
     before: float
     after: float
     floor: float
     moves: float
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the JSON."""
-        return {
-            "record": self.file,
-            "channel": self.channel,
-            "before": self.before,
-            "after": self.after,
-            "floor": self.floor,
-            "moves": self.moves,
-        }
 
 
 @dataclass(frozen=True)
@@ -301,7 +286,11 @@ def fit_nominal(
     for file, record in records.items():
         check_record(rig, record, control, file)
     readers = readers_of(rig, records, control)
-    outputs = [output.halved(rig) for output in _outputs(readers)]
+    outputs = list[Output]()
+    for reader in readers:
+        outputs += reader.outputs()
+        outputs += airframe_outputs(reader.rig, reader.record, reader.number)
+    outputs = [output.halved(rig) for output in outputs]
     if not outputs:
         problem = "holds too little to judge any stage by, so nothing can be fitted"
         raise InputError(next(iter(records)), "", problem)
@@ -324,16 +313,17 @@ def fit_nominal(
             problem = f"nothing in these records depends on it; they lack {needs}"
             raise InputError(next(iter(records)), key, problem)
     shown_in = {output.stage for output in touched(outputs, effects)}
-    fits = _fitted(rig, control, outputs, effects, tell)
-    numbers = dict(zip(chosen, fits.numbers(rig, control), strict=True))
+    fitter = _Fitter(rig, control, outputs, tell)
+    fits = fitter.fitted(effects)
+    numbers = dict(zip(chosen, fits.numbers, strict=True))
     groups = fits.whole.groups
     while loose := [numbers[e.name] for e in effects if numbers[e.name].width > 1.0]:
         # The least determined one stays as filed, and the others are fitted again.
         worst = max(loose, key=lambda number: number.width)
         numbers[worst.key] = worst.as_filed
         effects = [effect for effect in effects if effect.name != worst.key]
-        fits = _fitted(rig, control, outputs, effects, tell)
-        numbers |= {one.key: one for one in fits.numbers(rig, control)}
+        fits = fitter.fitted(effects)
+        numbers |= {one.key: one for one in fits.numbers}
     held = fits.held
     clock = {SETTINGS[STAMP].value_key(p) for p in SETTINGS[STAMP].free}
     together = [one for group in groups.values() for one in alike(group)]
@@ -353,57 +343,79 @@ def fit_nominal(
     )
 
 
-@dataclass(frozen=True)
-class _Fits:
-    """Fits of the same parameters: to every other stretch, to all, and to each record alone."""
+class _Fits(NamedTuple):
+    """Fits of the same parameters: to every other stretch, and to all; and the parameters."""
 
-    effects: Sequence[Effect]
     held: Fit
     whole: Fit
-    each: Sequence[Fit]
-
-    def numbers(self, rig: Rig, control: ControlName) -> list[Number]:
-        """Return the parameters as fitted to all records."""
-        return [_number(rig, control, one, self.whole, self.each) for one in self.effects]
+    numbers: list[Number]
 
 
-def _fitted(
-    rig: Rig,
-    control: ControlName,
-    outputs: Sequence[Output],
-    effects: Sequence[Effect],
-    tell: Tell | None,
-) -> _Fits:
-    """Return the fits to every other stretch, to all, and to each record alone."""
-    records = len({output.record for output in outputs})
-    _tell(tell, "fitting", 0, records + 2)
-    held = _fit(rig, control, outputs, effects, part="fitted")
-    _tell(tell, "fitting to all", 1, records + 2)
-    whole = _fit(rig, control, outputs, effects, held.values)
-    return _Fits(effects, held, whole, _fits_by_record(rig, control, outputs, effects, whole, tell))
+@dataclass(frozen=True)
+class _Fitter:
+    """Fits parameters of a rig to some outputs."""
 
+    rig: Rig
+    control: ControlName
+    outputs: Sequence[Output]
+    tell: Tell | None
 
-def _fit(
-    rig: Rig,
-    control: ControlName,
-    outputs: Sequence[Output],
-    effects: Sequence[Effect],
-    start: Mapping[str, float] | None = None,
-    part: Part = "all",
-) -> Fit:
-    """Return effects fitted to a part of some outputs, beside a time stamp error of the force.
+    def fitted(self, effects: Sequence[Effect]) -> _Fits:
+        """Return the fits, and the parameters as fitted to all records.
 
-    The error is a nuisance parameter within the tolerance of a recorder's clocks. Without it a lag
-    of a fraction of a frame is fitted as friction. A free delay of the force stands for it.
-    """
-    clock = SETTINGS[STAMP]
-    (number,) = clock.free
-    timed = {number.key, BY_NAME[LAG].free[0].key}
-    loader = any({*clock.shows_in} & {*effect.shows_in} for effect in effects)
-    beside = [clock] if loader and timed.isdisjoint(keys_of(effects)) else []
-    priors = {clock.value_key(number): (0.0, number.high / NORMAL_95)}
-    case = Case(rig, control, outputs)
-    return fit_set(case, effects, beside, priors, start or {}, part=part)
+        The interval of a parameter is at least its scatter between the records, each fitted alone.
+        """
+        records = sorted({output.record for output in self.outputs})
+        tasks = len(records) + 2
+        self._say("fitting", 0, tasks)
+        held = self._fit(effects, self.outputs, part="fitted")
+        self._say("fitting to all", 1, tasks)
+        whole = self._fit(effects, self.outputs, held.values)
+        each = list[Fit]()
+        for i, record in enumerate(records if len(records) > 1 else []):
+            self._say(f"fitting to record {i + 1} alone", i + 2, tasks)
+            ours = [output for output in self.outputs if output.record == record]
+            each.append(self._fit(effects, ours, whole.values))
+        return _Fits(held, whole, [self._number(one, whole, each) for one in effects])
+
+    def _say(self, what: str, done: int, tasks: int) -> None:
+        if self.tell is not None:
+            self.tell(what, done, tasks)
+
+    def _fit(
+        self,
+        effects: Sequence[Effect],
+        outputs: Sequence[Output],
+        start: Mapping[str, float] | None = None,
+        part: Part = "all",
+    ) -> Fit:
+        """Return effects fitted to a part of some outputs, beside a time stamp error of the force.
+
+        The error is a nuisance parameter within the tolerance of a recorder's clocks. Without it a
+        lag of a fraction of a frame is fitted as friction. A free delay of the force stands for it.
+        """
+        clock = SETTINGS[STAMP]
+        (number,) = clock.free
+        timed = {number.key, BY_NAME[LAG].free[0].key}
+        loader = any({*clock.shows_in} & {*effect.shows_in} for effect in effects)
+        beside = [clock] if loader and timed.isdisjoint(keys_of(effects)) else []
+        priors = {clock.value_key(number): (0.0, number.high / NORMAL_95)}
+        case = Case(self.rig, self.control, outputs)
+        return fit_set(case, effects, beside, priors, start or {}, part=part)
+
+    def _number(self, effect: Effect, whole: Fit, each: Sequence[Fit]) -> Number:
+        """Return a parameter with the wider of its interval and its scatter between records."""
+        (parameter,) = effect.free
+        name = effect.value_key(parameter)
+        found, half = whole.values[name], 0.5 * (whole.high[name] - whole.low[name])
+        if each:
+            scatter = float(np.std([one.values[name] for one in each], ddof=1))
+            half = max(half, 2.0 * scatter)
+        if abs(found - parameter.low) < 1e-6 * parameter.starts[0]:
+            found = parameter.low  # a fit at its bound stays slightly inside
+        filed = float(parameter.nominal(self.rig, self.control))
+        known = half if math.isfinite(half) else None
+        return Number(effect.name, filed, found, known, parameter.low, name in whole.at_bound)
 
 
 def _doubts_of_servo(
@@ -460,58 +472,6 @@ def _with_starts(
     (number,) = effect.free
     starts = tuple(one[number.name] for one in seen)
     return replace(effect, parameters=(replace(number, starts=starts),)) if starts else effect
-
-
-def _tell(tell: Tell | None, what: str, done: int, total: int) -> None:
-    if tell is not None:
-        tell(what, done, total)
-
-
-def _outputs(readers: Sequence[Reader]) -> list[Output]:
-    found: list[Output] = []
-    for reader in readers:
-        found += reader.outputs()
-        found += airframe_outputs(reader.rig, reader.record, reader.number)
-    return found
-
-
-def _fits_by_record(
-    rig: Rig,
-    control: ControlName,
-    outputs: Sequence[Output],
-    effects: Sequence[Effect],
-    whole: Fit,
-    tell: Tell | None,
-) -> list[Fit]:
-    """Return a fit to each record alone; none for a single record."""
-    records = sorted({output.record for output in outputs})
-    found = []
-    for i, record in enumerate(records if len(records) > 1 else []):
-        _tell(tell, f"fitting to record {i + 1} alone", i + 2, len(records) + 2)
-        ours = [output for output in outputs if output.record == record]
-        found.append(_fit(rig, control, ours, effects, whole.values))
-    return found
-
-
-def _number(
-    rig: Rig,
-    control: ControlName,
-    effect: Effect,
-    whole: Fit,
-    each: Sequence[Fit],
-) -> Number:
-    """Return a parameter with the wider of its interval and its scatter between records."""
-    (parameter,) = effect.free
-    name = effect.value_key(parameter)
-    found, half = whole.values[name], 0.5 * (whole.high[name] - whole.low[name])
-    if each:
-        scatter = float(np.std([one.values[name] for one in each], ddof=1))
-        half = max(half, 2.0 * scatter)
-    if abs(found - parameter.low) < 1e-6 * parameter.starts[0]:
-        found = parameter.low  # a fit at its bound stays slightly inside
-    filed = float(parameter.nominal(rig, control))
-    known = half if math.isfinite(half) else None
-    return Number(effect.name, filed, found, known, parameter.low, name in whole.at_bound)
 
 
 def _with_fitted(rig: Rig, control: ControlName, numbers: Sequence[Number]) -> Rig:

@@ -11,12 +11,11 @@ import pytest
 from coupled import diagnose as judge
 from coupled import load_rig
 from coupled.errors import InputError
-from coupled.gap.checks import trimmed
+from coupled.gap.checks import at_rate_of, motion_alone, trimmed
 from coupled.gap.diagnose import diagnose
 from coupled.gap.findings.diagnosis import Diagnosis
 from coupled.gap.findings.flown import fly_force
 from coupled.gap.stages.airframe import airframe_outputs
-from coupled.gap.stages.alone import at_rate_of, motion_alone
 from coupled.record.importing.convert import import_log
 from coupled.record.record import Record
 from coupled.resources import shipped_rigs

@@ -15,11 +15,10 @@ import coupled as package
 from coupled.errors import InputError
 from coupled.gap.batch import Job, Row
 from coupled.gap.chain import Part
-from coupled.gap.diagnose import _airframe_first, diagnose
+from coupled.gap.diagnose import _airframe_first, diagnose, parts_of
 from coupled.gap.findings.budget import shapley_subsets
 from coupled.gap.findings.diagnosis import Diagnosis, verdict_of_all
 from coupled.gap.findings.result import Findings, Verdict
-from coupled.gap.parts import parts_of
 from coupled.gap.thresholds import MOST_PLAYERS
 from coupled.record.channels import CONTROL_NAMES, ControlName
 from coupled.record.record import Record, write_record

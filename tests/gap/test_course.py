@@ -108,12 +108,12 @@ def test_a_gap_that_grows_with_amplitude_has_no_onset() -> None:
     assert loud(np.ones_like(T_s), growing).begins is None
     steady = np.sin(3.0 * T_s)
     found = loud((T_s > 15.0).astype(np.float64), steady)
-    assert found.begins.low_s <= 15.0 <= found.begins.high_s
+    assert found.begins.low <= 15.0 <= found.begins.high
     assert found.ends is None
     jam = loud(((T_s > 15.0) & (T_s < 30.0)).astype(np.float64), steady)
-    assert jam.begins.at_s == pytest.approx(15.0, abs=0.6)
-    assert jam.ends.at_s == pytest.approx(30.0, abs=0.6)
-    assert jam.ends.low_s <= 30.0 <= jam.ends.high_s
+    assert jam.begins.value == pytest.approx(15.0, abs=0.6)
+    assert jam.ends.value == pytest.approx(30.0, abs=0.6)
+    assert jam.ends.low <= 30.0 <= jam.ends.high
 
 
 def coming(tmp_path: Path, values: dict[str, dict[str, float]], size: Size) -> Record:

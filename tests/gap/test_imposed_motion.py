@@ -10,8 +10,7 @@ import pytest
 from coupled.gap.diagnose import diagnose
 from coupled.gap.effects.library import EFFECTS
 from coupled.gap.nominal import default_keys, fit_nominal
-from coupled.gap.prepare import readers_of
-from coupled.gap.signals.drives import as_driven
+from coupled.gap.prepare import as_driven, readers_of
 from coupled.gap.stages.tried import as_judged
 from tests.support.machines import damper, damper_rig
 

@@ -26,9 +26,8 @@ from coupled.gap.search.beam import search_sets
 from coupled.gap.search.case import Case
 from coupled.gap.search.found import Candidate, Choice, Fit, Found
 from coupled.gap.signals.output import Output
-from coupled.gap.stages.terms import with_terms
-from coupled.gap.stages.tried import tried_effects
-from coupled.gap.thresholds import COURSE_GAIN
+from coupled.gap.stages.tried import tried_effects, with_terms
+from coupled.gap.thresholds import RIVAL_GAIN
 from coupled.record.channels import LATERAL
 from coupled.record.record import Record
 from coupled.resources import shipped_rigs
@@ -137,7 +136,7 @@ def test_the_manoeuvre_that_separates_two_functions_moves_the_control_that_does(
     choice = Choice((step,), fits[0], fits[0], {}, ())
     best, *_ = next_tests(cessna, record, "column", choice)
     assert "on the wheel" in best.text
-    assert best.gain > COURSE_GAIN
+    assert best.gain > 2.0 * RIVAL_GAIN
     assert best.rivals == (terms[0].name, terms[1].name)
 
 

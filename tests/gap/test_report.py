@@ -63,8 +63,8 @@ def test_where_tells_what_a_gap_follows_and_since_when(tmp_path: Path) -> None:
     assert again is not None
     assert found.begins is None
     assert again.begins is not None
-    assert again.begins.at_s == pytest.approx(20.0, abs=2.5)
-    assert again.begins.low_s <= 20.0 <= again.begins.high_s
+    assert again.begins.value == pytest.approx(20.0, abs=2.5)
+    assert again.begins.low <= 20.0 <= again.begins.high
 
 
 @pytest.mark.slow

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coupled.gap.effects.library import BY_NAME, EFFECTS
-from coupled.gap.effects.scales import Scales, in_scale
+from coupled.gap.effects.settings import Scales, in_scale
 from coupled.gap.search.fit import fit_alone
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points

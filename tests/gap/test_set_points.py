@@ -14,8 +14,7 @@ from coupled.gap.effects.airframe import AIRFRAME
 from coupled.gap.effects.effect import Effect
 from coupled.gap.effects.library import BY_NAME, EFFECTS
 from coupled.gap.nominal import fit_nominal
-from coupled.gap.prepare import readers_of
-from coupled.gap.signals.drives import as_counted, as_driven, in_set_points
+from coupled.gap.prepare import as_counted, as_driven, in_set_points, readers_of
 from coupled.gap.signals.output import Output
 from coupled.gap.stages.tried import tried_effects
 from coupled.record.record import Record

@@ -5,8 +5,6 @@ An effect whose moment needs lateral motion is tried only with records that have
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from coupled.gap.effects.effect import (
     TERMS,
     Drawing,
@@ -48,16 +46,14 @@ def _factor_on(
 ) -> Effect:
     """Return the effect of a factor of the rig's `flight` section."""
     number = factor(f"flight.{name}", start, *bounds)
-    return replace(one("airframe", name, number, x, y, drawing, 4.0), needs=needs)
+    return one("airframe", name, number, x, y, drawing, 4.0, needs=needs)
 
 
 def _gust(name: str, key: str, drawn: str, needs: tuple[str, ...]) -> Effect:
     """Return the effect of gusts, by the key of their rms."""
     number = value("rms_m_per_s", f"flight.{key}", 0, 30, 0.5)
     error = Sampled(spread_of_crossing_air if name == "lateral_gust" else spread_of_air)
-    return replace(
-        one("airframe", name, number, "", drawn, "time", 6.0), needs=needs, sampled=error
-    )
+    return one("airframe", name, number, "", drawn, "time", 6.0, needs=needs, sampled=error)
 
 
 AIRFRAME: tuple[Effect, ...] = (

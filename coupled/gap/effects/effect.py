@@ -45,7 +45,7 @@ class ModelError(NamedTuple):
     absolute: float = 0.0
 
 
-USUAL = ModelError()
+USUAL, EXACT = ModelError(), ModelError(0.0)
 
 
 @dataclass(frozen=True)
@@ -143,9 +143,13 @@ class Parameter:
 
     def error(self, value: float, rig: Rig, control: ControlName) -> float:
         """Return the smallest standard error of a value, from its model error."""
-        none = self.base(rig, control) if self.above else self.neutral(rig, control)
-        size = abs(value) if self.is_limit else abs(value - none)
+        size = self.size(value, rig, control)
         return hypot(self.model_error.relative * size, self.model_error.absolute)
+
+    def size(self, value: float, rig: Rig, control: ControlName) -> float:
+        """Return how far a value is from that without an effect; of a limit, the value itself."""
+        none = self.base(rig, control) if self.above else self.neutral(rig, control)
+        return abs(value) if self.is_limit else abs(value - none)
 
     def neutral(self, rig: Rig, control: ControlName) -> float:
         """Return the value that leaves the rig's value unchanged."""
@@ -390,44 +394,38 @@ def _breakaway(rig: Rig, control: ControlName, changes: Mapping[str, Any]) -> di
     return {BREAKAWAY: float(changes[FRICTION]) + max(filed - running, 0.0)}
 
 
-# A potentiometer is set, and a servo tuned, to 1 or 2 %: within this tolerance the value is a
-# nuisance parameter, and no effect.
+def factor(
+    key: str, start: float, low: float = 0.1, high: float = 10.0, **options: Any
+) -> Parameter:
+    """Return a factor on the rig's value, with more fields of `Parameter` as options."""
+    return Parameter("factor", key, "factor", low, high, (start,), **options)
 
 
-def factor(key: str, start: float, low: float = 0.1, high: float = 10.0) -> Parameter:
-    """Return a factor on the rig's value."""
-    return Parameter("factor", key, "factor", low, high, (start,))
-
-
-def added(name: str, key: str, low: float, high: float, *starts: float) -> Parameter:
+def added(
+    name: str, key: str, low: float, high: float, *starts: float, **options: Any
+) -> Parameter:
     """Return a parameter that is added to the rig's value."""
-    return Parameter(name, key, "added", low, high, starts)
+    return Parameter(name, key, "added", low, high, starts, **options)
 
 
-def value(name: str, key: str, low: float, high: float, *starts: float) -> Parameter:
+def value(
+    name: str, key: str, low: float, high: float, *starts: float, **options: Any
+) -> Parameter:
     """Return a parameter that replaces the rig's value."""
-    return Parameter(name, key, "value", low, high, starts)
+    return Parameter(name, key, "value", low, high, starts, **options)
 
 
-def limit(name: str, key: str, low: float, high: float, *starts: float) -> Parameter:
+def limit(
+    name: str, key: str, low: float, high: float, *starts: float, **options: Any
+) -> Parameter:
     """Return a limit: a smaller value has a larger effect."""
-    return replace(value(name, key, low, high, *starts), kind="limit")
+    return value(name, key, low, high, *starts, kind="limit", **options)
 
 
-def exact(parameter: Parameter) -> Parameter:
-    """Return a parameter that is no size, without model error."""
-    return replace(parameter, role="other", model_error=ModelError(0.0))
-
-
-def real_bend(start: float) -> Parameter:
-    """Return the actual bend coefficient K."""
-    number = value("bend_{d}_per_N", "loader.bend_{d}_per_N", 0, 1e-2, start)
-    return replace(number, role="other")
-
-
-def bend_beside(start: float) -> Parameter:
-    """Return the actual bend coefficient K of another effect; it starts at the nominal value."""
-    return replace(real_bend(start), above="loader.bend_{d}_per_N")
+def real_bend(start: float, above: str = "") -> Parameter:
+    """Return the actual bend coefficient K, with a start above the value of a key."""
+    key = "loader.bend_{d}_per_N"
+    return value("bend_{d}_per_N", key, 0, 1e-2, start, role="other", above=above)
 
 
 def switch(key: str, on: Any) -> Switch:
@@ -443,9 +441,10 @@ def one(
     y: str,
     drawing: Drawing = "law",
     zoom_s: float = 2.5,
+    **options: Any,
 ) -> Effect:
-    """Return an effect of one parameter, drawn as y against x."""
-    return Effect(name, stage, (parameter,), Signature(x, y, drawing, zoom_s))
+    """Return an effect of one parameter, drawn as y against x, with more fields of `Effect`."""
+    return Effect(name, stage, (parameter,), Signature(x, y, drawing, zoom_s), **options)
 
 
 def setting_of(

@@ -2,7 +2,7 @@
 
 An entry is data, and holds all that a diagnosis uses of its effect: a name, the stage where it
 acts, the keys of the rig file that it frees, with bounds and start values, and options of the
-screen, the fit and the plot.
+screen, the fit and the plot. The effects of loader, linkage and airframe have modules of their own.
 """
 
 from __future__ import annotations
@@ -13,8 +13,11 @@ from dataclasses import replace
 from coupled.gap.effects.airframe import AIRFRAME
 from coupled.gap.effects.effect import (
     BY_REGRESSOR,
+    EXACT,
     UNIT,
     Effect,
+    Sampled,
+    Signature,
     added,
     factor,
     keys_of,
@@ -26,7 +29,9 @@ from coupled.gap.effects.effect import (
 )
 from coupled.gap.effects.linkage import LINKAGE, without_servo
 from coupled.gap.effects.loader import LOADER
-from coupled.gap.effects.sensing import COMPENSATION, SENSING
+from coupled.gap.effects.seen import hums
+from coupled.gap.signals.missed import shares_missed, spread_of_missed, times_missed
+from coupled.gap.thresholds import CLOCK_s
 from coupled.record.channels import ControlName
 from coupled.rig.rig import Rig
 
@@ -56,9 +61,87 @@ EFFECTS: tuple[Effect, ...] = (
         *("pressure", "gradient", "law", WHOLE_s),
     ),
     *LOADER,
-    *SENSING,
+    one(
+        "sensing",
+        "deflection_scale",
+        factor("sensing.deflection_scale", 1.03),
+        *("computed", "computed_left"),
+        of_sensor=True,
+    ),
+    one(
+        "sensing",
+        "force_scale",
+        factor("sensing.force_scale", 1.03),
+        *("force", "missing"),
+        outputs=("loader", "linkage"),
+    ),
+    one(
+        "sensing",
+        "force_zero",
+        added("offset_N", "sensing.force_zero_N", -100, 100, 1.0),
+        *("force", "missing"),
+        outputs=("loader", "linkage"),
+    ),
+    one(
+        "sensing",
+        "deflection_zero",
+        added("offset_{d}", "sensing.deflection_zero_{d}", -0.2, 0.2, 1e-3),
+        *("computed", "deflection_left"),
+        outputs=("linkage",),
+    ),
+    one(
+        "sensing",
+        "scale_drift",
+        added("per_s", "sensing.scale_drift_per_s", -0.05, 0.05, 1e-3),
+        *("computed", "computed_left", "loop", 1e4),
+        of_sensor=True,
+    ),
+    Effect(
+        "mains_hum",
+        "sensing",
+        (
+            added("amplitude_{d}", "sensing.hum_{d}", 0, 0.1, 1e-4),
+            # The start sets the scale of difference steps, 0.1 Hz.
+            value(
+                *("frequency_Hz", "sensing.hum_frequency_Hz", 5, 1000, 0.1),
+                role="other",
+                kind="aliased",
+                model_error=EXACT,
+            ),
+            value(
+                *("phase_rad", "sensing.hum_phase_rad", -7, 7, 1.0),
+                role="other",
+                model_error=EXACT,
+            ),
+        ),
+        Signature("", "computed_left", "time", 0.2),
+        seen=hums,
+        of_sensor=True,
+    ),
+    one(
+        "sensing",
+        "force_skew",
+        added("delay_s", "sensing.force_stamp_s", -0.3, 0.3, 0.01, tolerance=CLOCK_s),
+        *("speed", "missing"),
+        outputs=("loader", "linkage"),
+    ),
+    one(
+        "sensing",
+        "motion_skew",
+        added("delay_s", "flight.motion_stamp_s", -0.4, 0.4, 0.05, tolerance=CLOCK_s),
+        *("elevator", "pitch_rate", "loop", 4.0),
+        outputs=("airframe",),
+    ),
     *LINKAGE,
-    *COMPENSATION,
+    one(
+        "compensation",
+        "dropped_frames",
+        added("share", "compensation.missed_share", 0, 0.9, 0.3, model_error=EXACT),
+        *("", "estimate_left", "time", 0.5),
+        outputs=("schedule", "multiplier", "compensation"),
+        sampled=Sampled(spread_of_missed, times_missed),
+        seen=shares_missed,
+    ),
     one(
         "surface",
         "cable_stretch",
@@ -80,7 +163,7 @@ EFFECTS: tuple[Effect, ...] = (
     one(
         "surface",
         "surface_freeplay",
-        replace(added("play_norm", "rigging.play_norm", 0, 0.5, 0.01), kind="saturating"),
+        added("play_norm", "rigging.play_norm", 0, 0.5, 0.01, kind="saturating"),
         *("wanted", "answer_left", "loop"),
     ),
     *AIRFRAME,

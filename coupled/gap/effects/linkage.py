@@ -10,7 +10,6 @@ from coupled.gap.effects.effect import (
     ModelError,
     Signature,
     added,
-    bend_beside,
     factor,
     limit,
     one,
@@ -28,10 +27,18 @@ DAMPING_RATIO = replace(
     may_end=True,
 )
 # A stiff contact closes within a frame, so its stiffness is known no better than a friction's.
-_CONTACT = replace(
-    limit("stiffness_N_per_{d}", "loader.play_stiffness_N_per_{d}", 1e3, 1e8, 5e5, 1e5, 2e4),
+_CONTACT = limit(
+    "stiffness_N_per_{d}",
+    "loader.play_stiffness_N_per_{d}",
+    1e3,
+    1e8,
+    5e5,
+    1e5,
+    2e4,
     model_error=ModelError(YIELDING_ERROR),
 )
+# Of another effect of the bend: it starts at the nominal value.
+_BEND_BESIDE = real_bend(1e-6, above="loader.bend_{d}_per_N")
 LINKAGE: tuple[Effect, ...] = (
     one("linkage", "bend", real_bend(5e-5), *("force", "bent")),
     Effect(
@@ -63,14 +70,10 @@ LINKAGE: tuple[Effect, ...] = (
         "bend_hysteresis",
         "linkage",
         (
-            bend_beside(1e-6),
-            replace(
-                value("share", "loader.bend_hysteresis_share", 0, 0.98, 0.3),
-                role="other",
-            ),
-            replace(
-                value("width_N", "loader.bend_hysteresis_width_N", 0, 500, 5.0, 1.0, 25.0),
-                role="other",
+            _BEND_BESIDE,
+            value("share", "loader.bend_hysteresis_share", 0, 0.98, 0.3, role="other"),
+            value(
+                "width_N", "loader.bend_hysteresis_width_N", 0, 500, 5.0, 1.0, 25.0, role="other"
             ),
         ),
         Signature("force", "bent", "loop", 6.0),
@@ -80,12 +83,10 @@ LINKAGE: tuple[Effect, ...] = (
         "structural_mode",
         "linkage",
         (
-            bend_beside(1e-6),
+            _BEND_BESIDE,
             limit("frequency_Hz", "loader.bend_frequency_Hz", 0.5, 200, 8.0),
-            replace(
-                value("damping_ratio", "loader.bend_damping_ratio", 0, 2, 0.05),
-                role="other",
-                may_end=True,
+            value(
+                "damping_ratio", "loader.bend_damping_ratio", 0, 2, 0.05, role="other", may_end=True
             ),
         ),
         Signature("force", "bent", "loop", 1.5),
@@ -94,7 +95,7 @@ LINKAGE: tuple[Effect, ...] = (
     one(
         "linkage",
         "servo_lag",
-        replace(factor(SERVO, 0.8), tolerance=SETTING),
+        factor(SERVO, 0.8, tolerance=SETTING),
         *("speed", "deflection_left", "law", 0.8),
     ),
     one(

@@ -6,7 +6,6 @@ All laws of dry friction have a running level. They differ in the force near zer
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 from coupled.gap.effects.effect import (
     BY_REGRESSOR,
@@ -26,43 +25,25 @@ from coupled.gap.effects.seen import ripples, stops
 from coupled.gap.thresholds import OTHER_SCALE, SETTING, YIELDING_ERROR, CLOCK_s
 
 _DRAWN = Signature("speed", "missing")
+_YIELDING = ModelError(YIELDING_ERROR)
 
 
 def _level(*starts_N: float) -> Parameter:
     """Return the running friction above the nominal one."""
-    return Parameter("friction_N", "loader.friction_N", "added", 0, 60, starts_N)
-
-
-_BREAKAWAY = Parameter("breakaway_N", "loader.breakaway_N", "value", 0, 200, (2.0, 3.0, 3.0))
-_FADING = Parameter(
-    "stribeck_{d}_per_s", "loader.stribeck_rate_{d}_per_s", "value", 2e-4, 0.05, (2e-3,)
-)
-_CONTACT = Parameter(
-    *("stiffness_N_per_{d}", "loader.friction_stiffness_N_per_{d}", "value", 1e2, 1e8, (1e4, 1e5)),
-    model_error=ModelError(YIELDING_ERROR),
-)
-
-
-_ELASTIC = Parameter(
-    *("elastic_share", "loader.friction_elastic_share", "value", 0, 0.98, (0.3,)),
-    role="shape",
-    may_end=True,
-    model_error=ModelError(YIELDING_ERROR),
-)
+    return added("friction_N", "loader.friction_N", 0, 60, *starts_N)
 
 
 def _one_way(name: str, *starts_N: float) -> Parameter:
     """Return the friction in one direction of motion above the nominal one."""
-    number = Parameter(name, f"loader.friction_{name}", "added", 0, 60, starts_N)
-    return replace(number, may_end=True)
+    return added(name, f"loader.friction_{name}", 0, 60, *starts_N, may_end=True)
 
 
 def _per_unit(name: str, key: str) -> Parameter:
     """Return a size for each unit of the regressor, in RMS forces per its standard deviation.
 
-    `scales` converts starts and bounds to those of records.
+    `settings` converts starts and bounds to those of records.
     """
-    return Parameter(name, key, "added", -OTHER_SCALE, OTHER_SCALE, (0.1, -0.1))
+    return added(name, key, -OTHER_SCALE, OTHER_SCALE, 0.1, -0.1)
 
 
 FRICTIONS: tuple[Effect, ...] = (
@@ -72,8 +53,14 @@ FRICTIONS: tuple[Effect, ...] = (
         "loader",
         (
             _level(1.0, 0.3, 0.1),
-            replace(_BREAKAWAY, above="loader.friction_N"),
-            replace(_FADING, role="shape"),
+            value(
+                *("breakaway_N", "loader.breakaway_N", 0, 200, 2.0, 3.0, 3.0),
+                above="loader.friction_N",
+            ),
+            value(
+                *("stribeck_{d}_per_s", "loader.stribeck_rate_{d}_per_s", 2e-4, 0.05, 2e-3),
+                role="shape",
+            ),
         ),
         _DRAWN,
         dry=True,
@@ -82,7 +69,21 @@ FRICTIONS: tuple[Effect, ...] = (
     Effect(
         "presliding_friction",
         "loader",
-        (_level(1.5), replace(_CONTACT, role="shape", kind="limit"), _ELASTIC),
+        (
+            _level(1.5),
+            limit(
+                *("stiffness_N_per_{d}", "loader.friction_stiffness_N_per_{d}"),
+                *(1e2, 1e8, 1e4, 1e5),
+                role="shape",
+                model_error=_YIELDING,
+            ),
+            value(
+                *("elastic_share", "loader.friction_elastic_share", 0, 0.98, 0.3),
+                role="shape",
+                may_end=True,
+                model_error=_YIELDING,
+            ),
+        ),
         _DRAWN,
         dry=True,
         contains=("coulomb_friction",),
@@ -118,8 +119,7 @@ QUARTERS_rad = tuple(0.5 * math.pi * k for k in range(-1, 3))  # hanging, level,
 
 def _stop(side: str) -> Parameter:
     """Return where a stop lies on one side; it may be beyond all that a record meets."""
-    number = limit(f"{side}_{{d}}", f"loader.stop_{side}_{{d}}", 1e-4, 10, 0.05)
-    return replace(number, may_end=True)
+    return limit(f"{side}_{{d}}", f"loader.stop_{side}_{{d}}", 1e-4, 10, 0.05, may_end=True)
 
 
 LOADER: tuple[Effect, ...] = (
@@ -127,13 +127,13 @@ LOADER: tuple[Effect, ...] = (
     one(
         "loader",
         "inertia",
-        replace(factor("loader.mass_kg", 1.2), tolerance=SETTING),
+        factor("loader.mass_kg", 1.2, tolerance=SETTING),
         *("acceleration", "missing", "law", 1.5),
     ),
     one(
         "loader",
         "viscous_damping",
-        replace(factor("loader.damping_N_s_per_{d}", 1.2), tolerance=SETTING),
+        factor("loader.damping_N_s_per_{d}", 1.2, tolerance=SETTING),
         *("speed", "missing"),
     ),
     one(
@@ -172,22 +172,17 @@ LOADER: tuple[Effect, ...] = (
         _per_unit("force_N_per_unit", BY_REGRESSOR[0]),
         *("regressor", "missing"),
     ),
-    replace(
-        one(
-            "loader",
-            "digital_multiplier",
-            switch("loader.multiplier", "digital"),
-            *("noise", "product_left", "law", 0.3),
-        ),
+    one(
+        "loader",
+        "digital_multiplier",
+        switch("loader.multiplier", "digital"),
+        *("noise", "product_left", "law", 0.3),
         outputs=("loader", "multiplier"),
     ),
     one(
         "loader",
         "transport_delay",
-        replace(
-            added("delay_s", "loader.delay_s", 0, 0.19, 0.01),
-            model_error=ModelError(absolute=CLOCK_s),
-        ),
+        added("delay_s", "loader.delay_s", 0, 0.19, 0.01, model_error=ModelError(absolute=CLOCK_s)),
         *("speed", "computed_left", "law", 1.0),
     ),
     Effect(
@@ -195,8 +190,8 @@ LOADER: tuple[Effect, ...] = (
         "loader",
         (
             added("ripple_N", "loader.ripple_N", 0, 60, 1.0),
-            replace(value("period_{d}", "loader.ripple_period_{d}", 2e-4, 0.5, 1e-2), role="other"),
-            replace(value("phase_rad", "loader.ripple_phase_rad", -7, 7, 1.0), role="other"),
+            value("period_{d}", "loader.ripple_period_{d}", 2e-4, 0.5, 1e-2, role="other"),
+            value("phase_rad", "loader.ripple_phase_rad", -7, 7, 1.0, role="other"),
         ),
         Signature("computed", "missing"),
         seen=ripples,
@@ -206,10 +201,7 @@ LOADER: tuple[Effect, ...] = (
         "loader",
         (
             added("gravity_N", "loader.gravity_N", 0, 60, 1.0),
-            replace(
-                value("angle_rad", "loader.gravity_angle_rad", -7, 7, *QUARTERS_rad),
-                role="shape",
-            ),
+            value("angle_rad", "loader.gravity_angle_rad", -7, 7, *QUARTERS_rad, role="shape"),
         ),
         Signature("computed", "missing"),
     ),
@@ -218,10 +210,7 @@ LOADER: tuple[Effect, ...] = (
         "loader",
         (
             added("stiffness_N_per_{d}", "loader.relaxing_stiffness_N_per_{d}", 0, 1e5, 200.0),
-            replace(
-                value("time_s", "loader.relaxing_time_s", 5e-3, 100, 0.2, 1.5),
-                role="shape",
-            ),
+            value("time_s", "loader.relaxing_time_s", 5e-3, 100, 0.2, 1.5, role="shape"),
         ),
         Signature("speed", "missing", "loop", 6.0),
     ),
@@ -241,13 +230,11 @@ LOADER: tuple[Effect, ...] = (
         Signature("computed", "missing"),
         seen=stops,
     ),
-    replace(
-        one(
-            "loader",
-            "crosstalk",
-            added("factor", "loader.crosstalk", -0.9, 0.9, 0.05),
-            *("other_force", "missing"),
-        ),
+    one(
+        "loader",
+        "crosstalk",
+        added("factor", "loader.crosstalk", -0.9, 0.9, 0.05),
+        *("other_force", "missing"),
         needs=(OTHER_FORCE,),
     ),
     one(

@@ -30,12 +30,10 @@ from coupled.gap.chain import BY_NAME as STAGE_OF
 from coupled.gap.effects.effect import Effect, touched
 from coupled.gap.search.case import Case
 from coupled.gap.search.found import Choice, Fit
-from coupled.gap.signals.output import Output
+from coupled.gap.signals.output import Floats, Output
 from coupled.gap.thresholds import BOOTSTRAPS, FEW_STRETCHES, MOST_PLAYERS
 from coupled.results import Plain
 from coupled.rig.rig import Rig
-
-Floats = NDArray[np.float64]
 
 
 def shapley_subsets(players: int) -> tuple[list[int], Floats]:

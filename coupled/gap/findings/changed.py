@@ -38,18 +38,16 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import nctdtrinc, stdtrit
 
 from coupled.display import unit_in
 from coupled.gap.noise.smooth import rate_of, smoothed
-from coupled.gap.signals.output import Output, memory
+from coupled.gap.signals.output import Floats, Output, memory
 from coupled.gap.thresholds import CHANGE_CHANCE, FEW, NEARLY_ALL, ROUNDING_SPAN, SMALL, TINY
 from coupled.record.channels import ControlName, channel
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
 
-Floats = NDArray[np.float64]
 SIDES = ((1, "positive"), (-1, "negative"))
 # The levels of motion in both directions: a and a₀. A motion in one has a mean only.
 LEVEL, MIDDLE = "half difference of the directions", "mean of both directions"
@@ -65,7 +63,7 @@ class Interval:
 
     `scatter` is the standard deviation between healthy records, `limit` the difference that chance
     exceeds with the probability of the test, `shown` the change that the test shows with
-    probability `CHANGE_SHOWN`; both infinite with fewer than two healthy records.
+    probability `NEARLY_ALL`; both infinite with fewer than two healthy records.
     """
 
     difference: float

@@ -26,24 +26,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtr, stdtrit
 
-from coupled.gap.effects.effect import Effect, touched
+from coupled.gap.effects.effect import Effect
 from coupled.gap.findings.where import free_share, response, signals
 from coupled.gap.noise.smooth import smoothed
 from coupled.gap.search.case import Case
 from coupled.gap.search.found import Fit
-from coupled.gap.signals.output import Output
-from coupled.gap.thresholds import (
-    DRIFT,
-    DRIFT_CHANCE,
-    FEW,
-    HOST_DRIFT,
-    LEAST_STRETCHES,
-    PARTLY,
-    SMALL,
-)
+from coupled.gap.signals.output import Floats, Output
+from coupled.gap.thresholds import DRIFT, DRIFT_CHANCE, FEW, HOST_DRIFT, PARTLY, SMALL
 from coupled.record.record import Record
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -151,7 +141,7 @@ def _regime(by: str, parts: Sequence[tuple[Acts, Floats]], lasting: float) -> Re
         return None
     sizes = [_size(action[rows], left[rows], number[rows], lasting) for rows in (low, high)]
     (a, a_error, a_held), (b, b_error, b_held) = sizes
-    if min(a_held, b_held) < LEAST_STRETCHES:
+    if min(a_held, b_held) < 2.0:  # one has no scatter
         return None
     squares = (a_error**2, b_error**2)
     apart = squares[0] ** 2 / (a_held - 1.0) + squares[1] ** 2 / (b_held - 1.0)
@@ -256,12 +246,7 @@ def credibility(
     effect: Effect, case: Case, found: Fit, records: Sequence[Record], remains: float
 ) -> Credibility:
     """Return an effect's credibility; `remains` is the weight of the residual (`remainder`)."""
-    without = case.with_only(found, [other for other in found.effects if other is not effect])
-    acts = []
-    for output in touched(case.outputs, [effect]):
-        left = output.residual(found.rig)
-        action = output.residual(without) - left
-        acts.append(Acts(output, records[output.record], action, left))
+    acts = [Acts(one, records[one.record], *each) for one, *each in case.actions(found, effect)]
     plain = Credibility(effect.name, regimes(case, acts), remainder=remains)
     if effect.stage == "schedule":
         return replace(plain, exact=True)

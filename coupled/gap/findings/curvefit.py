@@ -24,11 +24,12 @@ from coupled.display import split_unit
 from coupled.errors import InputError
 from coupled.gap.search.evidence import misfit
 from coupled.gap.search.problem import ModelError
-from coupled.gap.signals.output import Output, Part, memory
+from coupled.gap.signals.output import Floats, Output, Part, memory
 from coupled.gap.thresholds import (
     CURVE_KINKS,
     CURVE_NODES,
     CURVE_PLACES,
+    NORMAL_95,
     PRIOR_EFFECT,
     PRIOR_NUMBER,
     PRIOR_SPAN,
@@ -41,7 +42,6 @@ from coupled.rig.curves import Curve as RigCurve
 from coupled.rig.rig import Rig
 from coupled.schema import SMALLEST, file_keys
 
-Floats = NDArray[np.float64]
 WIDTH = PRIOR_SPAN / math.sqrt(2.0 * math.pi)  # prior's width over the size (`search.evidence`)
 Values = tuple[Floats, Floats]  # nodes and values of a curve
 
@@ -302,7 +302,7 @@ class Pick:
     def errors(self, basis: Basis) -> Floats:
         """Return half of the 95 % interval of each value."""
         found = np.zeros(len(self.at))
-        half = 1.96 * UNDERSTATED * np.sqrt(np.diag(self.known.covariance))
+        half = NORMAL_95 * UNDERSTATED * np.sqrt(np.diag(self.known.covariance))
         found[basis.free[list(self.at)]] = half
         return found
 

@@ -19,7 +19,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from coupled.display import split_unit
 from coupled.gap.chain import BY_NAME as STAGE_OF
@@ -50,31 +49,24 @@ from coupled.gap.search.case import Case
 from coupled.gap.search.evidence import evidence, evidence_of, fewest_unexplained, misfit
 from coupled.gap.search.found import Choice, Fit
 from coupled.gap.search.problem import ModelError, Problem
-from coupled.gap.signals.output import (
-    Output,
-    explained_below,
-    stage_gaps,
-    stage_limits,
-)
+from coupled.gap.signals.output import Floats, Output, explained_below, stage_gaps, stage_limits
 from coupled.gap.signals.reading import LOAD
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points
 from coupled.gap.thresholds import (
     CERTAIN,
-    CURVE_ROUNDS,
     DRIFT_CHANCE,
     LESSER,
     MOST,
     NEGLIGIBLE,
     RIVAL_GAIN,
+    TRIES,
 )
 from coupled.parallel import in_threads
 from coupled.record.channels import ControlName, unit_of
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
 from coupled.rig.surface import share_of_travel
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -217,7 +209,10 @@ class _Fitter:
         ]
         if not flown:
             return None
-        gains = [pick.known.rest + self._raised(basis, rig) for basis, pick, rig in flown]
+        gains = [
+            pick.known.rest + self._likelihood(basis, rig) - self._likelihood(basis, self.rig)
+            for basis, pick, rig in flown
+        ]
         first = next(k for k, gain in enumerate(gains) if gain > max(gains) - RIVAL_GAIN)
         basis, pick, fitted = self._refined(*flown[first])
         line = straight(basis, basis.sums("fitted"))
@@ -234,10 +229,6 @@ class _Fitter:
     def _gain(self, basis: Basis, pick: Pick) -> float:
         """Return the log evidence of a law's linear model, less that without a curve."""
         return pick.known.log - self._likelihood(basis, self.rig)
-
-    def _raised(self, basis: Basis, rig: Rig) -> float:
-        """Return the log likelihood of a rig, less that without a curve."""
-        return self._likelihood(basis, rig) - self._likelihood(basis, self.rig)
 
     def _beats_effects(self, rig: Rig, pick: Pick) -> bool:
         """Tell whether a curve has more evidence than the effects found, and than none."""
@@ -368,7 +359,7 @@ class _Fitter:
 
     def _refined(self, basis: Basis, pick: Pick, rig: Rig) -> tuple[Basis, Pick, Rig]:
         """Return a law fitted again about its last curve, while the fit improves, and its rig."""
-        for _ in range(CURVE_ROUNDS):
+        for _ in range(TRIES):
             again = self._basis(basis.law, basis.places, basis.outputs, pick.values(basis))
             if again is None:
                 break

@@ -13,7 +13,6 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from coupled.display import percent
 from coupled.errors import InputError
@@ -26,17 +25,19 @@ from coupled.gap.chain import AIRFRAME
 from coupled.gap.effects.library import BY_NAME
 from coupled.gap.findings.budget import shapley_subsets
 from coupled.gap.findings.result import labelled
+from coupled.gap.findings.summary import joined
 from coupled.gap.noise.smooth import smoothed
-from coupled.gap.signals.drives import drifts, softest_gradient
+from coupled.gap.signals.output import Floats
+from coupled.gap.signals.reading import drifts, softest_gradient
 from coupled.gap.stages.airframe import gusts_of, has_gusts
 from coupled.gap.stages.surfaces import surface_channel
 from coupled.gap.thresholds import NEGLIGIBLE, SHORT_FRAMES
 from coupled.record.channels import ControlName, channel
 from coupled.record.record import Record
+from coupled.results import Plain
 from coupled.rig.rig import Rig
 from coupled.schema import SMALLEST
 
-Floats = NDArray[np.float64]
 COMPARED = ("deflection", "computed")  # of the control, and of the motion:
 MOTION = ("pitch_rate_rad_per_s", "load_factor", "pitch_rad")
 LATERAL = ("roll_rate_rad_per_s", "yaw_rate_rad_per_s")
@@ -217,7 +218,7 @@ RATES: Mapping[ControlName, tuple[str, ...]] = {
 
 
 @dataclass(frozen=True)
-class EffectInFlight:
+class EffectInFlight(Plain):
     """The change of the flight by one effect, by channel.
 
     `shares` are of the power of the change by all effects, and sum to 1; negative if the effect
@@ -236,18 +237,8 @@ class EffectInFlight:
 
     @property
     def shows(self) -> bool:
-        """Whether removing the effect changes any channel by at least `IN_FLIGHT_LEAST`."""
+        """Whether removing the effect changes any channel by at least `NEGLIGIBLE`."""
         return any(value >= NEGLIGIBLE for value in self.of_motion.values())
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the JSON."""
-        return {
-            "name": self.name,
-            "share": self.share,
-            "shares": dict(self.shares),
-            "changes": dict(self.changes),
-            "of_motion": dict(self.of_motion),
-        }
 
 
 def in_flight(
@@ -320,14 +311,10 @@ def in_words(effects: Sequence[EffectInFlight]) -> str:
     if len(effects) == 1:
         (only,) = effects
         parts = [f"the {_plain(n)} by {_per_cent(v)}" for n, v in only.of_motion.items()]
-        return f"In flight it changes {_listed(parts)} of their rms."
+        return f"In flight it changes {joined(parts)} of their rms."
     parts = [f"{labelled(e.name, e.control)} {_per_cent(e.share)}" for e in effects]
     first = labelled(effects[0].name, effects[0].control)
-    return f"Shares of the change in flight: {_listed(parts)}. Correct {first} first."
-
-
-def _listed(parts: Sequence[str]) -> str:
-    return parts[0] if len(parts) == 1 else ", ".join(parts[:-1]) + " and " + parts[-1]
+    return f"Shares of the change in flight: {joined(parts)}. Correct {first} first."
 
 
 def _plain(name: str) -> str:

@@ -19,7 +19,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from coupled.display import unit_in
 from coupled.gap.effects.effect import Effect
@@ -29,13 +28,11 @@ from coupled.gap.noise.smooth import smoothed
 from coupled.gap.search.case import Case
 from coupled.gap.search.found import Fit
 from coupled.gap.search.problem import Problem
-from coupled.gap.signals.output import HiddenGap, Output, Part
+from coupled.gap.signals.output import Floats, HiddenGap, Output, Part
 from coupled.gap.thresholds import ROUGH, SIGMAS
 from coupled.record.channels import ControlName
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -113,7 +110,7 @@ def _rate(output: Output) -> float:
 def tolerances(case: Case, found: Fit) -> dict[str, float]:
     """Return the tolerances of the fitted parameters by key, in the keys' units.
 
-    They are `HEALTHY_SIGMAS` standard deviations between records. For a single record they are
+    They are `SIGMAS` standard deviations between records. For a single record they are
     those between its halves, and at least a share of the effect, as both halves have one motion.
     """
     numbers = sorted({output.record for output in case.outputs})

@@ -18,12 +18,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from coupled.errors import InputError
 from coupled.gap.effects.effect import (
     Effect,
-    Parameter,
     apply,
     keys_of,
     possible,
@@ -38,25 +36,15 @@ from coupled.gap.search.case import Case
 from coupled.gap.search.evidence import likelier_by
 from coupled.gap.search.found import Choice
 from coupled.gap.search.problem import Problem
-from coupled.gap.signals.output import Output, white
+from coupled.gap.signals.output import Floats, Output, white
 from coupled.gap.stages.airframe import airframe_outputs
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points
 from coupled.gap.stages.tried import lacking_keys
-from coupled.gap.thresholds import (
-    COURSE_GAIN,
-    DOUBLED,
-    MOST,
-    POWER_DECADES,
-    POWER_HALVINGS,
-    FLIGHT_s,
-    PIECE_s,
-)
+from coupled.gap.thresholds import DOUBLED, FAR, MOST, RIVAL_GAIN, SMALL, FLIGHT_s, PIECE_s
 from coupled.record.channels import ControlName, channel, noisy_channels
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -124,16 +112,10 @@ def _values(effect: Effect, size: float, nominal: Rig, control: ControlName) -> 
         elif p.is_limit:
             value = start / size
         else:
-            value = _base(p, nominal, control) + size * start
+            filed = value_of(nominal, control, p.above or p.key) if p.mode == "value" else 0.0
+            value = float(filed) + size * start
         values[effect.value_key(p)] = float(np.clip(value, p.low, p.high))
     return values
-
-
-def _base(p: Parameter, nominal: Rig, control: ControlName) -> float:
-    """Return the value from which a parameter's size counts."""
-    if p.mode != "value":
-        return 0.0
-    return float(value_of(nominal, control, p.above or p.key))
 
 
 def _signature(
@@ -186,14 +168,14 @@ def _least(
     high = 1.0
     while not shows(high):
         high *= 10.0
-        if high > 10.0**POWER_DECADES:
+        if high > FAR:
             return None
     low = high / 10.0
     while shows(low):
         low, high = low / 10.0, low
-        if low < 10.0**-POWER_DECADES:
+        if low < 1.0 / FAR:
             break
-    for _ in range(POWER_HALVINGS):
+    while high > (1.0 + SMALL) * low:
         middle = math.sqrt(low * high)
         low, high = (low, middle) if shows(middle) else (middle, high)
     return _values(effect, high, nominal, control)
@@ -232,7 +214,8 @@ def next_tests(
         return ()
     rival = step.rivals[0]
     others = tuple(effect for effect in choice.fit.effects if effect is not step.effect)
-    noise = {name: white(record[name]) for name in _noisy(nominal, record)}
+    channels = noisy_channels(list(nominal.controls), flown=nominal.flight is not None)
+    noise = {name: white(record[name]) for name in channels if name in record}
     found = []
     pair = ((*others, rival.effect), (*others, step.effect))
     of_air = all(effect.stage == "airframe" for effects in pair for effect in effects)
@@ -260,11 +243,6 @@ def _as_flown(rig: Rig, test: Rig, control: ControlName) -> Rig:
     freed = [p.key for effect in EFFECTS for p in effect.parameters if p.key.startswith("flight.")]
     kept = {key: value_of(rig, control, key) for key in (*freed, "flight.terms")}
     return rig.changed({"flight": test.flight}).changed(kept)
-
-
-def _noisy(rig: Rig, record: Record) -> list[str]:
-    channels = noisy_channels(list(rig.controls), flown=rig.flight is not None)
-    return [name for name in channels if name in record]
 
 
 def _gain(
@@ -353,7 +331,7 @@ def in_one_line(
     if tests_found:
         best = tests_found[0]
         one, other = map(plain, best.rivals)
-        if best.gain < COURSE_GAIN:
+        if best.gain < DOUBLED * RIVAL_GAIN:
             return (
                 f"No candidate test discriminates {one} from {other}:"
                 " this rig responds alike to both."

@@ -17,7 +17,7 @@ from coupled.gap.findings.budget import Shrink, StageBudget
 from coupled.gap.findings.result import EffectResult, Findings, ParameterEstimate, StageResult
 from coupled.gap.findings.where import Remains, Where
 from coupled.gap.noise.lines import SeenLine
-from coupled.gap.thresholds import CERTAIN, MINOR, MOST_CHANGE
+from coupled.gap.thresholds import CERTAIN, MINOR
 
 _SENTENCE = re.compile(r"(?<=\.) (?=[A-ZΑ-Ω])")
 OF_SIGNAL = {
@@ -261,7 +261,7 @@ def _since(found: Findings) -> str:
 
 def _between(stage: str, where: Where) -> list[str]:
     """Return onset and end of a stage's gap, if it is not there all the time."""
-    begins, ends = (f"{span.at_s:.1f} s" if span else "" for span in (where.begins, where.ends))
+    begins, ends = (f"{span.value:.1f} s" if span else "" for span in (where.begins, where.ends))
     if begins and ends:
         return [f"The gap in the {stage} is there from {begins} to {ends}."]
     if begins:
@@ -289,7 +289,7 @@ def in_time(effect: EffectResult) -> str:
         unit = " of them" if course.kind == "events" else f" {first.unit}".rstrip()
         if course.kind != "events" and (first.relative or first.name == "per_s"):
             share, unit = share.times(100.0), " %"
-            if abs(share.value) > MOST_CHANGE:
+            if abs(share.value) > 100.0:
                 return f"{capital(plain(effect.name))}: {', '.join([*said, FAST])}."
         ends = f"{share.low:.3g} to {share.high:.3g}"
         said.append(f"at {share.value:.3g}{unit} a minute ({ends})")

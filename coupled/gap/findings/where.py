@@ -29,7 +29,8 @@ from numpy.typing import NDArray
 from coupled.gap.noise.lines import SeenLine, widest_line
 from coupled.gap.noise.noise import filtered, of_second_order
 from coupled.gap.noise.smooth import rate_of, smoothed
-from coupled.gap.signals.output import Output
+from coupled.gap.search.course import Bounds
+from coupled.gap.signals.output import Floats, Output
 from coupled.gap.thresholds import (
     BENDS,
     DOUBLED,
@@ -49,7 +50,6 @@ from coupled.record.record import Record
 from coupled.results import Plain
 from coupled.rig.rig import Rig
 
-Floats = NDArray[np.float64]
 Response = tuple[Floats, Floats]
 ALL = "all"
 
@@ -151,8 +151,8 @@ class Where:
     follows: tuple[Follows, ...]
     peak_Hz: float
     loud: float
-    begins: Span | None = None
-    ends: Span | None = None
+    begins: Bounds | None = None
+    ends: Bounds | None = None
     by_pressure: tuple[PressureBand, ...] = ()
     line: SeenLine | None = None
 
@@ -163,7 +163,7 @@ class Where:
         found |= {"peak_Hz": self.peak_Hz, "loud": self.loud}
         for name, span in (("onset", self.begins), ("end", self.ends)):
             if span is not None:
-                found |= {f"{name}_s": span.at_s, f"{name}_95_s": [span.low_s, span.high_s]}
+                found |= {f"{name}_s": span.value, f"{name}_95_s": [span.low, span.high]}
         if self.by_pressure:
             found["by_pressure"] = [band.as_dict() for band in self.by_pressure]
         if self.line is not None:
@@ -377,24 +377,15 @@ Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
-class Span:
-    """A time in s from the record's start, with its bounds."""
-
-    at_s: float
-    low_s: float
-    high_s: float
-
-
-@dataclass(frozen=True)
 class InTime:
     """The share of the windows in which a residual is loud, and its onset and end.
 
-    Onset or end is None if the excitation can explain it.
+    Onset or end, in s from the record's start, is None if the excitation can explain it.
     """
 
     loud: float
-    begins: Span | None
-    ends: Span | None
+    begins: Bounds | None
+    ends: Bounds | None
 
 
 def in_time(left: Floats, drives: Mapping[str, Floats], rate_Hz: float) -> InTime:
@@ -409,15 +400,11 @@ def in_time(left: Floats, drives: Mapping[str, Floats], rate_Hz: float) -> InTim
         return InTime(share, None, None)
     begins = _begins(loud, excited)
     turned = _begins(loud[::-1], excited[:, ::-1])
-    return InTime(
-        share,
-        None if begins is None else Span(*(window_s * k for k in begins)),
-        None if turned is None else _turned(Span(*(last - k for k in turned)), window_s),
-    )
-
-
-def _turned(span: Span, window_s: float) -> Span:
-    return Span(window_s * span.at_s, window_s * span.high_s, window_s * span.low_s)
+    ends = None
+    if turned is not None:
+        at_s, high_s, low_s = (window_s * (last - k) for k in turned)
+        ends = Bounds(at_s, low_s, high_s)
+    return InTime(share, None if begins is None else Bounds(*(window_s * k for k in begins)), ends)
 
 
 def _begins(loud: Mask, excited: Floats) -> tuple[int, int, int] | None:

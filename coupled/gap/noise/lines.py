@@ -15,8 +15,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coupled.gap.noise.noise import Floats
 from coupled.gap.thresholds import (
     LESSER,
     LINE_HEIGHT,
@@ -29,8 +29,6 @@ from coupled.gap.thresholds import (
     WHITE_FRAMES,
     MAINS_Hz,
 )
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -29,10 +29,9 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from coupled.gap.noise.lines import Line, lines_in
-from coupled.gap.noise.noise import Noise, noise_of, noise_of_input
+from coupled.gap.noise.noise import Floats, Noise, noise_of, noise_of_input
 from coupled.gap.thresholds import FEW_FRAMES, PIECE, SIGMAS, SMALL
 
-Floats = NDArray[np.float64]
 REST_FRAMES = PIECE // 2  # of a window at rest
 
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 from itertools import product
 from math import hypot
 
@@ -24,8 +24,8 @@ from coupled.gap.effects.library import LAG, STAMP
 from coupled.gap.effects.settings import contact, is_dry, lag_within_a_step, settings
 from coupled.gap.search.course import Bounds, Timing, timed
 from coupled.gap.search.found import Fit
-from coupled.gap.signals.output import Output, stage_gaps, stage_limits
-from coupled.gap.thresholds import ELASTIC_SHARES, LENGTHS, LESSER, MINOR, MISMATCH, SEARCHED_TO
+from coupled.gap.signals.output import Floats, Output, stage_gaps, stage_limits
+from coupled.gap.thresholds import ELASTIC_SHARES, LENGTHS, LESSER, MINOR, MISMATCH
 from coupled.record.channels import ControlName
 from coupled.rig.rig import Rig
 
@@ -34,19 +34,17 @@ Cost = Callable[[float, float], float]  # mean square residual by a length, d, a
 
 def contact_start(cost: Cost, most: float, most_elastic: float) -> tuple[float, float]:
     """Return the length, d, and elastic share of least cost, each up to its largest value."""
-    known: dict[tuple[float, float], float] = {}
 
+    @cache
     def cost_at(at: tuple[float, float]) -> float:
-        if at not in known:
-            known[at] = cost(*at)
-        return known[at]
+        return cost(*at)
 
     def within(length: float, share: float) -> tuple[float, float]:
         return min(max(length, 1e-3 * most), most), min(max(share, 0.0), most_elastic)
 
     best = min((within(x * most, s) for x, s in product(LENGTHS, ELASTIC_SHARES)), key=cost_at)
     times, more = 1.5, 0.2
-    while times - 1.0 > SEARCHED_TO:
+    while times - 1.0 > MINOR:
         length, share = best
         longer = ((length * times, share), (length / times, share))
         softer = ((length, share + more), (length, share - more))
@@ -101,7 +99,7 @@ class Case:
             if spoiled:
                 found[name] = replace(one, outputs=(*one.shows_in, *spoiled))
         if found.get(STAMP) not in (None, filed.get(STAMP)):
-            found[LAG] = lag_within_a_step(self.nominal, self.control)
+            found[LAG] = lag_within_a_step(self.nominal)
         return found
 
     def _driven_over_limit(self, setting: Effect) -> tuple[str, ...]:
@@ -185,11 +183,6 @@ class Case:
             found[one.stage] = max(found.get(one.stage, 0.0), gap)
         return found
 
-    def over_limit(self, rig: Rig) -> set[str]:
-        """Return the outputs whose gap exceeds its limit with a rig."""
-        limits = stage_limits(self.outputs)
-        return {at for at, gap in self.gaps(rig).items() if gap > limits[at]}
-
     def without_colour_allowance(self, root: Rig) -> Case:
         """Return the case without the allowance for unknown noise colour, where there is a gap.
 
@@ -257,6 +250,15 @@ class Case:
         free = [one for one in known if one.value_key(one.free[0]) in found.values]
         rig = possible(self.nominal, self.control, (*effects, *free), found.values)
         return self.nominal if rig is None else rig
+
+    def actions(self, found: Fit, effect: Effect) -> list[tuple[Output, Floats, Floats]]:
+        """Return the outputs on which an effect of a fit acts, with its action and the residual.
+
+        Both in noise floors: the residual is with all effects, the action what it is less without.
+        """
+        without = self.with_only(found, [other for other in found.effects if other is not effect])
+        lefts = ((one, one.residual(found.rig)) for one in touched(self.outputs, [effect]))
+        return [(one, one.residual(without) - left, left) for one, left in lefts]
 
     def but_for_contact(self, values: Mapping[str, float]) -> dict[str, float]:
         """Return fitted values without the presliding parameters."""

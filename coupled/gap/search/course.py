@@ -26,17 +26,17 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import chdtri
 
 from coupled.gap.effects.effect import Effect, dotted, value_of
-from coupled.gap.signals.output import Output, memory
+from coupled.gap.signals.output import Floats, Output, memory
 from coupled.gap.thresholds import (
-    COURSE_GAIN,
+    DOUBLED,
     ENDS,
     NEGLIGIBLE,
     NORMAL_95,
     ONSET_CHANCE,
+    RIVAL_GAIN,
     ROUGH,
     ONSETS_s,
     WINDOW_s,
@@ -45,7 +45,6 @@ from coupled.record.channels import ControlName
 from coupled.results import Plain
 from coupled.rig.rig import Rig
 
-Floats = NDArray[np.float64]
 Kind = Literal["constant", "changes", "from", "grows", "events"]
 
 
@@ -129,7 +128,7 @@ def course_of(
     count = len(sizes) / memory(best.residual)
     changed = abs(best.factor) * times_s[-1] if best.kind == "changes" else math.inf
     gain = 0.5 * count * math.log(max(always.cost, 1e-300) / max(best.cost, 1e-300))
-    if gain < COURSE_GAIN or changed < ROUGH:
+    if gain < DOUBLED * RIVAL_GAIN or changed < ROUGH:
         return plain
     near = [one for one in others if one.kind == best.kind and _near(one, best, count)]
     sure = NORMAL_95 * math.sqrt(best.cost / max(count - 2.0, 1.0))

@@ -19,27 +19,26 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any, Literal, Protocol
+from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
-from coupled.gap.signals.output import memory
+from coupled.gap.signals.output import Floats, memory
 from coupled.gap.thresholds import (
     DAMPING_FACTOR,
     DAMPING_FIRST,
     DIFFERENCE,
     DIFFERENCE_STEPS,
+    DOUBLED,
+    FEW,
     FEWER,
     FIT_ITERATIONS,
     LESSER,
     MINOR,
     MOST,
-    MOVED_LITTLE,
     NEGLIGIBLE,
     PARTLY,
-    RACE_BEHIND,
     ROUGH,
     ROUNDS,
     SLOPES_KEPT,
@@ -48,7 +47,6 @@ from coupled.gap.thresholds import (
 )
 from coupled.parallel import in_threads
 
-Floats = NDArray[np.float64]
 Ends = tuple[Floats, Floats]
 
 
@@ -105,10 +103,6 @@ class Slopes:
             self.sure = True
         return jacobian
 
-    def renew(self) -> None:
-        """Discard the last Jacobian, so that differences are taken next."""
-        self.last = None
-
     def _still_good(self, x: Floats, here: Floats) -> Floats | None:
         """Return the last Jacobian, corrected if need be; None if it no longer holds."""
         last = self.last
@@ -117,7 +111,7 @@ class Slopes:
         moved, step = here - last.residual, x - last.at
         size = _rms(moved)
         if not self._smooth or size <= TINY:
-            return last.jacobian if size <= MOVED_LITTLE else None
+            return last.jacobian if size <= FEW else None
         missed = _rms(moved - last.jacobian @ step)
         if self.corrections >= (2 * ROUNDS) or missed > ROUGH * size:
             return None
@@ -237,16 +231,6 @@ def _step(
     return step, 0.5 * float(against @ against - after @ after)
 
 
-class Residual(Protocol):
-    """The residual in noise floors as a function of scaled parameters.
-
-    `coarse`: with coarse steps of the loader. `rough`: approximate, for derivatives.
-    """
-
-    def __call__(self, scaled: Floats, coarse: bool = False, rough: bool = False) -> Floats:
-        """Return the residual, shape (frames,)."""
-
-
 @dataclass(frozen=True)
 class End:
     """The result of least squares: scaled parameters, residual and Jacobian.
@@ -282,7 +266,7 @@ class Descent:
 
     def end(
         self,
-        residual: Residual,
+        residual: Callable[..., Floats],
         firsts: Sequence[Floats],
         ends: Ends,
         stepped: bool,
@@ -290,7 +274,9 @@ class Descent:
     ) -> End:
         """Return the best minimum from several starts, between the bounds `ends`.
 
-        If nothing is `stepped` finer than the frames, the second phase is skipped. With a single
+        `residual` returns the residual in noise floors, shape (frames,), by scaled parameters; with
+        `coarse` by coarse steps of the loader, with `rough` approximately, for derivatives. If
+        nothing is `stepped` finer than the frames, the second phase is skipped. With a single
         start, `slope` may be the Jacobian of another fit that ended there.
         """
         near, sloping = partial(residual, coarse=True), partial(residual, coarse=True, rough=True)
@@ -315,7 +301,7 @@ class Descent:
             return started[0]
         best = search.down(started[0].x, self.most, started[0].slope)
         for other in started[1:]:
-            behind = other.cost > RACE_BEHIND * started[0].cost
+            behind = other.cost > DOUBLED**2 * started[0].cost
             if behind or leaves_noise(best.cost, len(best.fun)):
                 break
             best = min(best, search.down(other.x, self.most, other.slope), key=lambda one: one.cost)
@@ -366,7 +352,7 @@ class _Search:
             misled = found.rejected and slopes.corrections > 0
             if (slopes.sure and not misled) or most < 1:
                 break
-            slopes.renew()
+            slopes.last = None  # so that differences are taken next
             x0 = found.x
         known = None if slopes.last is None or misled else slopes.last.kept()
         return End(found.x, found.cost, found.fun, found.jac, known)

@@ -40,16 +40,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from coupled.gap.effects.effect import Effect, Parameter
 from coupled.gap.search.found import Fit, Group
 from coupled.gap.search.problem import ModelError, Problem
-from coupled.gap.signals.output import Output, memory
-from coupled.gap.thresholds import PRIOR_EFFECT, PRIOR_NUMBER, PRIOR_SPAN
+from coupled.gap.signals.output import Floats, Output, memory
+from coupled.gap.thresholds import NORMAL_95, PRIOR_EFFECT, PRIOR_NUMBER, PRIOR_SPAN
 from coupled.rig.rig import Rig
-
-Floats = NDArray[np.float64]
 
 
 def misfit(square: Floats, smooth: Floats | float = 1.0) -> Floats:
@@ -130,10 +127,8 @@ def _width(problem: Problem, p: Parameter, group: Group, key: str) -> float:
     flat = (high - low) / math.sqrt(2.0 * math.pi)
     if p.may_end:
         return flat
-    value = group.values[key]
-    none = p.base(case.nominal, case.control) if p.above else p.neutral(case.nominal, case.control)
-    size = abs(value) if p.is_limit else abs(value - none)
-    error = 0.5 * (group.high[key] - group.low[key]) / 1.96
+    size = p.size(group.values[key], case.nominal, case.control)
+    error = 0.5 * (group.high[key] - group.low[key]) / NORMAL_95
     size = min(max(size, error), flat) if math.isfinite(error) else flat
     return size * PRIOR_SPAN / math.sqrt(2.0 * math.pi)
 

@@ -10,15 +10,13 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from coupled.gap.effects.effect import Effect
 from coupled.gap.search.descent import Slope
+from coupled.gap.signals.output import Floats
 from coupled.gap.thresholds import MINOR, ROUGH
 from coupled.record.channels import ControlName
 from coupled.rig.rig import Rig
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

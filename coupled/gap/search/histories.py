@@ -11,14 +11,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from coupled.gap.effects.effect import Effect, touched
+from coupled.gap.effects.effect import Effect
 from coupled.gap.search.beam import search_sets
 from coupled.gap.search.case import Case
 from coupled.gap.search.course import Bounds, Course, course_of, course_of_events, timing_of
 from coupled.gap.search.found import Choice, Fit
 from coupled.gap.search.problem import Problem
 from coupled.gap.signals.output import Floats, explained_below, stage_limits
-from coupled.gap.thresholds import BEGUN, PARTLY, ROUNDS, WINDOW_s
+from coupled.gap.thresholds import ENDS, PARTLY, ROUNDS, WINDOW_s
 from coupled.record.record import Record
 
 Parts = list[tuple[Floats, Floats]]  # action of an effect and residual, of each output
@@ -111,7 +111,7 @@ def in_time(effect: Effect, case: Case) -> Case | None:
     rate_Hz = case.nominal.frame_rate
     seen = course_of(ours, rate_Hz, _size(effect, case, alone), effect.gradual)
     # A change from the record's start may be any drift: it is reported, and not taken as a cause.
-    if seen.onset_s is None or seen.onset_s.low < BEGUN * WINDOW_s:
+    if seen.onset_s is None or seen.onset_s.low < (ENDS + 1) * WINDOW_s:
         return None
     anew = case.timed(effect, timing_of(ours, rate_Hz), seen.onset_s)
     # Estimate again at the fitted size: friction and play are not linear in their size.
@@ -121,11 +121,8 @@ def in_time(effect: Effect, case: Case) -> Case | None:
 
 def _parts(effect: Effect, case: Case, found: Fit) -> dict[int, Parts]:
     """Return {record: (action of an effect, residual) of each output}, in noise floors."""
-    without = case.with_only(found, [other for other in found.effects if other is not effect])
     parts: dict[int, Parts] = {}
-    for output in touched(case.outputs, [effect]):
-        left = output.residual(found.rig)
-        action = output.residual(without) - left
+    for output, action, left in case.actions(found, effect):
         parts.setdefault(output.record, []).append((action, left))
     return parts
 

@@ -18,10 +18,9 @@ from numpy.typing import NDArray
 from scipy.special import chdtri, stdtrit
 
 from coupled.gap.search.descent import End
-from coupled.gap.signals.output import memory
-from coupled.gap.thresholds import EDGE_BISECTIONS, LEAST_MEMORIES, LEAST_STRETCHES
+from coupled.gap.signals.output import Floats, memory
+from coupled.gap.thresholds import DOUBLED, EDGE_BISECTIONS, LEAST_MEMORIES
 
-Floats = NDArray[np.float64]
 Numbers = NDArray[np.intp]
 
 
@@ -102,7 +101,7 @@ def cut(groups: Numbers, numbers: int, memories: float) -> Numbers:
     """
     begins = np.flatnonzero(np.diff(groups, prepend=groups[0] - 1))
     lengths = np.diff(np.append(begins, len(groups)))
-    wanted = LEAST_STRETCHES * numbers / len(np.unique(groups))
+    wanted = DOUBLED * numbers / len(np.unique(groups))
     room = float(np.median(lengths)) / (LEAST_MEMORIES * memories)
     parts = int(min(np.ceil(wanted), room))
     if parts < 2:

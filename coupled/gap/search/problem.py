@@ -8,7 +8,6 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from coupled.gap.effects.effect import Effect, possible
 from coupled.gap.effects.library import BY_NAME
@@ -17,11 +16,10 @@ from coupled.gap.search.case import Case
 from coupled.gap.search.descent import WHOLE, Descent
 from coupled.gap.search.fit import fit_set
 from coupled.gap.search.found import Fit
-from coupled.gap.signals.output import Output, Part, memory, stage_gaps, stage_limits
+from coupled.gap.signals.output import Floats, Output, Part, memory, stage_gaps, stage_limits
 from coupled.gap.thresholds import MISMATCH, NORMAL_95
 from coupled.rig.rig import Rig
 
-Floats = NDArray[np.float64]
 EXACT = ("schedule", "compensation", "linkage")  # outputs predicted without model error
 
 
@@ -98,12 +96,10 @@ class Problem:
         """
         freed = {p.key for effect in effects for p in effect.parameters}
         free = list(self.nuisances)
-        if any(e.dry for e in effects) or is_dry(self.case.nominal, self.case.control):
-            free += [one for one in self.case.contact if self._may_yield(one, effects)]
+        dry = any(e.dry for e in effects)
+        if dry or is_dry(self.case.nominal, self.case.control):
+            free += [one for one in self.case.contact if dry or self.case.is_open(one)]
         return [one for one in free if freed.isdisjoint(p.key for p in one.free)]
-
-    def _may_yield(self, contact: Effect, effects: Sequence[Effect]) -> bool:
-        return any(e.dry for e in effects) or self.case.is_open(contact)
 
     def fit(
         self,

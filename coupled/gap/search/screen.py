@@ -40,10 +40,10 @@ from coupled.gap.thresholds import (
     LIMIT_BISECTIONS,
     LIMIT_SHARES,
     MINOR,
+    NEGLIGIBLE,
     PRIOR_EFFECT,
     SCREEN_LESS,
     SCREEN_NEAR,
-    SCREEN_SHOWN,
     SERVO_SHARES,
     TINY,
 )
@@ -236,7 +236,7 @@ class Screen:
         for values, shape, whole in self.known[effect.name]:
             size = float(whole @ whole)
             # A limit that is never reached does not change the residual.
-            if size <= SCREEN_SHOWN * len(now):
+            if size <= NEGLIGIBLE**2 * len(now):
                 continue
             change = whole - beside @ (beside.T @ whole)
             if float(change @ change) <= TINY * size:
@@ -299,7 +299,7 @@ def _tries(problem: Problem, current: Fit, effect: Effect) -> list[list[Values]]
             if rig is None:
                 return False
             change = _residual(problem, effect, rig) - now
-            return float(change @ change) > SCREEN_SHOWN * len(now)
+            return float(change @ change) > NEGLIGIBLE**2 * len(now)
 
         return [[{key: value} for value in each] for each in limits(effect, shows)]
     if effect.seen is None:

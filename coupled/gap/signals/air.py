@@ -28,18 +28,16 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.polynomial import Polynomial
-from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 from scipy.linalg import solveh_banded
 
 from coupled.gap.noise.smooth import Smoother, rate_of, smoothed
-from coupled.gap.signals.output import estimate_noise, white
+from coupled.gap.signals.output import Floats, estimate_noise, white
 from coupled.gap.thresholds import FIRST_ROWS, STIFFEST_AIR
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
 from coupled.units import GRAVITY_m_per_s2
 
-Floats = NDArray[np.float64]
 LOAD = "load_factor"
 NEEDS = ("alpha_rad", "pitch_rad", "true_airspeed_m_per_s", "altitude_m")
 _LATERAL = ("sideslip_rad", "roll_rad", "heading_rad")
@@ -78,32 +76,28 @@ class Air:
         return float(np.sqrt(0.5 / max(independent, 1.0)))
 
 
-def vertical_air(
-    record: Record, frame_s: float, side_m_per_s2: Floats | None = None, seed: int = 43
-) -> Air | None:
+def vertical_air(record: Record, frame_s: float, side_m_per_s2: Floats | None = None) -> Air | None:
     """Return the vertical speed of the air at each frame; None if channels are missing.
 
     `side_m_per_s2` is the side force per mass, shape (frames,), which lifts a banked aircraft.
     """
     if any(name not in record for name in NEEDS):
         return None
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(43)
     side = np.zeros(len(record)) if side_m_per_s2 is None else side_m_per_s2
     climb, climb_error = _climb(record, frame_s, side, rng)
     rough = climb - smoothed(record["true_airspeed_m_per_s"]) * _flow(record)[2]
     return Air.of(rough, climb_error, rng)
 
 
-def crossing_air(
-    record: Record, frame_s: float, side_m_per_s2: Floats | None, seed: int = 44
-) -> Air | None:
+def crossing_air(record: Record, frame_s: float, side_m_per_s2: Floats | None) -> Air | None:
     """Return the speed of the air across the heading; None if channels are missing.
 
     `side_m_per_s2` is the side force per mass in the measured flow, shape (frames,).
     """
     if side_m_per_s2 is None or any(name not in record for name in NEEDS_ACROSS):
         return None
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(44)
     speed, roll = smoothed(record["true_airspeed_m_per_s"]), record["roll_rad"]
     ahead, right, _ = _flow(record)
     normal = _normal(record)

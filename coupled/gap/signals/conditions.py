@@ -1,30 +1,24 @@
-"""What acts on a record besides the hand: weather, events and services.
+"""What acts on a record besides the hand: weather and events.
 
 Wind, gusts and events are in the manifest of a record. The conditions of a simulated flight are
 known exactly: they act on the model too, and are not reported as effects. They are unknown for
 other records, and for a part of a record that does not begin with the flight.
-
-A recorded trim, autopilot or stick pusher is not an effect: it acts in the replay as recorded, in
-the stages on which it acted in flight.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from coupled.errors import InputError
 from coupled.flight.conditions import Conditions, build_conditions, condition_wrappers
 from coupled.flight.event import trim_moved
 from coupled.flight.wrapper import Wrapper
-from coupled.record.channels import ControlName, channel
+from coupled.gap.signals.output import Floats
+from coupled.record.channels import ControlName
 from coupled.record.record import Record
-from coupled.rig.serving import ServiceRows, service_rows
 
-Floats = NDArray[np.float64]
 FILE = "the manifest"
 
 
@@ -63,38 +57,3 @@ def trim_shift(record: Record, control: ControlName, frame_s: float) -> Floats:
     """
     times = np.arange(len(record), dtype=np.float64) * frame_s
     return trim_moved(conditions_of(record).event, control, times)
-
-
-class Reading(Protocol):
-    """One control in a record."""
-
-    @property
-    def record(self) -> Record:
-        """The record."""
-
-    @property
-    def control(self) -> ControlName:
-        """The control."""
-
-
-def services(reading: Reading) -> ServiceRows | None:
-    """Return the rows of the services; None if the record has none."""
-    return service_rows(reading.record, reading.control)
-
-
-def left(reading: Reading) -> Floats | float:
-    """Return the share of G_T that remains after a failure of the artificial feel."""
-    rows = services(reading)
-    return 1.0 if rows is None else 1.0 - rows.feel_lost
-
-
-def neutral(reading: Reading) -> Floats | float:
-    """Return the deflection about which F_mod acts, d."""
-    rows = services(reading)
-    return 0.0 if rows is None else rows.neutral
-
-
-def asked(reading: Reading) -> Floats:
-    """Return the command of the surface, d: δ̂, or as changed by a jam or the other side."""
-    rows = services(reading)
-    return reading.record[channel(reading.control, "estimate")] if rows is None else rows.asked

@@ -15,11 +15,9 @@ from numpy.typing import NDArray
 
 from coupled.gap.noise.noise import Noise, noise_of_input, quiet_noise
 from coupled.gap.noise.smooth import Rest, Smoother, rest_of, smoothed
-from coupled.gap.signals.output import estimate_noise, rounding
+from coupled.gap.signals.output import Floats, estimate_noise, rounding
 from coupled.gap.thresholds import FEW_FRAMES, SHORT_FRAMES, SIGMAS, TINY
 from coupled.rig.rig import Rig
-
-Floats = NDArray[np.float64]
 
 
 def noise_in(rig: Rig, channel: str, signal: Floats) -> Noise:

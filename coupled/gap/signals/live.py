@@ -26,6 +26,7 @@ from scipy.interpolate import CubicSpline
 from scipy.ndimage import median_filter
 
 from coupled.errors import InputError
+from coupled.gap.signals.output import Floats
 from coupled.gap.thresholds import (
     MOST,
     NEGLIGIBLE,
@@ -51,17 +52,10 @@ from coupled.record.channels import (
 )
 from coupled.record.record import Record
 
-Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 HARDWARE = ("bend", "friction", "breakout")  # switches of a simulated loader
 HOSTED = ("assumed_bend", "deflection", "gradient")  # switches of the host's compensation
 MEASURED = ("force", "computed", "deflection")
-
-# Samples with a gap of three frames at 120 Hz still represent signals below 15 Hz; a hand moves a
-# control below 5 Hz.
-# After a restart from a measured state, errors of that state decay: the slowest of the shipped
-# loaders has a time constant of 0.11 s, and the state is measured to within its noise.
-# A clock whose rate differs more from the host's is not used; crystals differ by 1e-4.
 
 
 @dataclass(frozen=True)
@@ -223,7 +217,7 @@ class _Clock:
             return
         time, own = record.time_s[rows], record[LOADER_TIME][rows]
         rate = float(np.median(np.diff(own) / np.diff(time)))
-        if not abs(rate - 1.0) < NEGLIGIBLE:
+        if not abs(rate - 1.0) < NEGLIGIBLE:  # crystals differ by 1e-4
             self.problem = f"The loader's clock runs {rate:.3g} times as fast as the host's"
             return
         away = (own - time) / frame_s

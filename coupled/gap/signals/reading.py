@@ -17,22 +17,22 @@ import numpy as np
 from coupled.gap.noise.lines import projected
 from coupled.gap.noise.noise import Noise, noise_of
 from coupled.gap.noise.smooth import smoothed
-from coupled.gap.signals.conditions import left
-from coupled.gap.signals.drives import drifts, softest_gradient
 from coupled.gap.signals.floors import Drive, floor_from, input_noise, noise_in
 from coupled.gap.signals.live import Assumed, Live, Mask, live_of
 from coupled.gap.signals.missed import Missed, missed_in
 from coupled.gap.signals.output import Floats
-from coupled.gap.thresholds import BEGUN_AWAY, BEGUN_MOVING, SETTLE_s
+from coupled.gap.thresholds import MINOR, PARTLY, SETTLE_s, SHORTEST_RECORD_s
 from coupled.record.channels import SURFACES, ControlName, channel
 from coupled.record.record import Record
 from coupled.rig.crossing import leaking
+from coupled.rig.equations import specified_gradient
 from coupled.rig.hosted import Feel, OtherInputs
 from coupled.rig.nodes import on_nodes
 from coupled.rig.parameters import Schedule, Sensing
 from coupled.rig.recorder import stamped
 from coupled.rig.replay import replay_schedule
 from coupled.rig.rig import Rig
+from coupled.rig.serving import ServiceRows, service_rows
 
 
 @dataclass(frozen=True)
@@ -175,8 +175,8 @@ class Reading:
             return False
         place = smoothed(self._measured(name))
         rate = np.gradient(place)
-        away = abs(float(place[0])) > BEGUN_AWAY * float(np.ptp(place))
-        return away or abs(float(rate[0])) > BEGUN_MOVING * float(np.std(rate))
+        away = abs(float(place[0])) > MINOR * float(np.ptp(place))
+        return away or abs(float(rate[0])) > PARTLY * float(np.std(rate))
 
     def assumed(self) -> Assumed | None:
         """Return K̂ in use, if it changed in flight."""
@@ -252,6 +252,8 @@ class Reading:
 
     def missing(self) -> dict[str, list[str]]:
         """Return the channels that each stage needs and the record does not have."""
+        if not self.rig.controls:  # an aircraft alone has none of these stages
+            return {}
         needs = {
             "schedule": [PRESSURE, self.name_of("gradient")]
             + [self.name_of("computed")] * self.schedule.curved,
@@ -277,7 +279,7 @@ class Reading:
     @property
     def set_points(self) -> bool:
         """Whether δc is a command, so that there is no loader to judge."""
-        return self.rig.controls[self.control].drive == "setpoint"
+        return self._drive == "setpoint"
 
     @property
     def moved(self) -> bool:
@@ -287,7 +289,12 @@ class Reading:
     @property
     def by_hand(self) -> bool:
         """Whether a bench imposes the motion of the grip."""
-        return self.rig.controls[self.control].drive == "displacement"
+        return self._drive == "displacement"
+
+    @property
+    def _drive(self) -> str:
+        data = self.rig.controls.get(self.control)
+        return "" if data is None else data.drive
 
     @property
     def in_series(self) -> bool:
@@ -342,12 +349,34 @@ class Reading:
             return [PRESSURE]
         return [own]
 
+    def services(self) -> ServiceRows | None:
+        """Return the rows of trim, autopilot and stick pusher; None if the record has none.
+
+        They are no effect, and act in the replay as recorded, in the stages on which they acted.
+        """
+        return service_rows(self.record, self.control)
+
+    def feel_left(self) -> Floats | float:
+        """Return the share of G_T that remains after a failure of the artificial feel."""
+        rows = self.services()
+        return 1.0 if rows is None else 1.0 - rows.feel_lost
+
+    def neutral(self) -> Floats | float:
+        """Return the deflection about which F_mod acts, d."""
+        rows = self.services()
+        return 0.0 if rows is None else rows.neutral
+
+    def asked(self) -> Floats:
+        """Return the command of the surface, d: δ̂, or as changed by a jam or the other side."""
+        rows = self.services()
+        return self.as_read("estimate") if rows is None else rows.asked
+
     def feel(self) -> Feel:
         """Return what the host specified: G_T as recorded, else of the nominal schedule at q̄.
 
         G_T beyond the break is never recorded, and a curve is always that of q̄.
         """
-        own, share, schedule = self.name_of("gradient"), left(self), self.schedule
+        own, share, schedule = self.name_of("gradient"), self.feel_left(), self.schedule
         pressure = np.full(len(self.record), schedule.dynamic_pressure[0])
         if PRESSURE in self.record:
             pressure = smoothed(self.record[PRESSURE])
@@ -378,6 +407,31 @@ class Reading:
             for name in names
             if name in self.record and noise_of(self._quiet(name)).filtered
         }
+
+
+def drifts(rig: Rig, control: ControlName, gradient: float) -> bool:
+    """Tell whether a prediction from the force would drift, for lack of a spring.
+
+    True if the loader's own period exceeds `SHORTEST_RECORD_s` at a gradient in N/d.
+    """
+    mass = rig.controls[control].loader.mass
+    return max(gradient, 0.0) * SHORTEST_RECORD_s**2 < 4.0 * np.pi**2 * mass
+
+
+def softest_gradient(rig: Rig, control: ControlName, record: Record) -> float:
+    """Return a record's least gradient, N/d: as recorded, from its q̄, or the table's least.
+
+    Of a curve, that of its softest segment.
+    """
+    gradient, pressure = channel(control, "gradient"), "dynamic_pressure_Pa"
+    schedule = rig.controls[control].schedule
+    if schedule.curved:
+        return min(map(min, schedule.segments))
+    if gradient in record:
+        return float(np.min(record[gradient]))
+    if pressure in record:
+        return float(np.min(specified_gradient(schedule, record[pressure])))
+    return min(schedule.total_gradient)
 
 
 def is_constant(schedule: Schedule) -> bool:

@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 
 from coupled.gap.noise.noise import Noise
 from coupled.gap.noise.smooth import Smoother, smoothed
-from coupled.gap.signals.conditions import neutral
 from coupled.gap.signals.floors import unsmoothed, with_error
 from coupled.gap.signals.output import Floats, Predict
 from coupled.gap.signals.reading import Reading
@@ -121,7 +120,7 @@ class Product:
     @cached_property
     def _neutral(self) -> Floats:
         """The δc of neutral with the services, d."""
-        return 0.0 * self._smooth + neutral(self.reading)
+        return 0.0 * self._smooth + self.reading.neutral()
 
     def _made(self, read: Floats, rig: Rig | None = None) -> Floats:
         """Return the product of δc as read, N, by a rig; default: the nominal one."""

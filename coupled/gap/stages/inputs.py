@@ -48,7 +48,7 @@ from coupled.gap.noise.smooth import rate_of, smoothed
 from coupled.gap.signals.floors import Drive, with_error
 from coupled.gap.signals.output import Floats, Predict
 from coupled.gap.signals.reading import Reading
-from coupled.gap.thresholds import CREEP_FRICTION_N, CREEP_WORSE, LESSER, SAMPLED, SIGMAS, TRIES
+from coupled.gap.thresholds import CREEP_FRICTION_N, CREEP_WORSE, LESSER, SIGMAS, TRIES
 from coupled.parallel import in_threads
 from coupled.record.channels import ControlName, unit_of
 from coupled.rig.hosted import Hosted
@@ -178,7 +178,7 @@ class Imposed:
         """Return a prediction with a small weight where the force jumps within a frame.
 
         A backlash that closes within a frame gives a sample between the forces before and after.
-        Only the share `JUMP_COUNTED` of the difference counts, which still guides a fit.
+        Only the share `LESSER` of the difference counts, which still guides a fit.
         """
         around = np.stack((np.roll(predicted, 1), np.roll(predicted, -1)))
         held = np.clip(self._reading.signal("force"), around.min(axis=0), around.max(axis=0))
@@ -200,7 +200,7 @@ class Series:
         self._grip = smoothed(reading.signal("deflection"))
         self._others = {name: smoothed(other) for name, other in reading.others().items()}
         self._leaks = [Nodes(smoothed(other)) for other in reading.partner()]
-        self._trembling = force.passed(np.random.default_rng(SAMPLED))
+        self._trembling = force.passed(np.random.default_rng(47))
         self._trembling_nodes = Nodes(self._trembling)
         self._walks: bool | None = None
 

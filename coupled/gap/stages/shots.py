@@ -13,15 +13,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from coupled.gap.noise.smooth import Smoother, smoothed
-from coupled.gap.signals.output import estimate_noise
-from coupled.gap.thresholds import NEGLIGIBLE, SHOT_s
+from coupled.gap.signals.output import Floats, estimate_noise
+from coupled.gap.thresholds import NEGLIGIBLE, SHORTEST_RECORD_s
 from coupled.record.record import Record
 from coupled.rig.recorder import stamped
 
-Floats = NDArray[np.float64]
 States = Mapping[int, Mapping[str, float]]  # by row: the measured states, by channel
 SLOW = ("true_airspeed_m_per_s", "pitch_rad")
 NEEDS = (*SLOW, "alpha_rad", "pitch_rate_rad_per_s")
@@ -42,7 +40,7 @@ class Restarts:
     @classmethod
     def of(cls, record: Record, frame_rate_Hz: float) -> Restarts | None:
         """Return the restarts of a record; None if it lacks a channel or does not last for two."""
-        every = round(SHOT_s * frame_rate_Hz)
+        every = round(SHORTEST_RECORD_s * frame_rate_Hz)
         if lacking(record) or len(record) <= every:
             return None
         names = (*NEEDS, *(one for one in BESIDE if one in record))

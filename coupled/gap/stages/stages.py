@@ -25,8 +25,7 @@ from numpy.typing import NDArray
 
 from coupled.gap.noise.noise import Noise, between_jumps, jumps
 from coupled.gap.noise.smooth import rate_of, smoothed
-from coupled.gap.signals.conditions import asked, left, neutral, reach_of, services, trim_shift
-from coupled.gap.signals.drives import drifts
+from coupled.gap.signals.conditions import reach_of, trim_shift
 from coupled.gap.signals.floors import (
     Drive,
     given_noise,
@@ -38,8 +37,8 @@ from coupled.gap.signals.floors import (
     with_error,
 )
 from coupled.gap.signals.live import Mask
-from coupled.gap.signals.output import HiddenGap, Output, Predict, estimate_noise, spread
-from coupled.gap.signals.reading import Reading
+from coupled.gap.signals.output import Floats, HiddenGap, Output, Predict, estimate_noise, spread
+from coupled.gap.signals.reading import Reading, drifts
 from coupled.gap.stages.host import Product, compensated
 from coupled.gap.stages.inputs import (
     Driven,
@@ -58,7 +57,6 @@ from coupled.gap.thresholds import (
     NEARLY_ALL,
     REPLAY_KNOWN,
     ROUNDING_SPAN,
-    SAMPLED,
     SMALL,
     TRIES,
     PIECE_s,
@@ -75,7 +73,6 @@ from coupled.rig.replay import (
 from coupled.rig.rig import Rig
 from coupled.rig.serving import held_force
 
-Floats = NDArray[np.float64]
 STEPPED = ("loader", "linkage")  # stages that run at the loader's own steps
 
 
@@ -97,7 +94,7 @@ def hosted_by(reading: Reading) -> Hosted:
     held = held_force(reading.rig, reading.record, reading.control)
     assumed = reading.assumed()
     more = None if assumed is None else assumed.gradient
-    return Hosted(services(reading), None, held, reach_of(reading.record, reading.control), more)
+    return Hosted(reading.services(), None, held, reach_of(reading.record, reading.control), more)
 
 
 @dataclass(frozen=True)
@@ -105,7 +102,12 @@ class Reader(Reading):
     """Builds the outputs that a record allows, and lists missing channels."""
 
     def outputs(self) -> list[Output]:
-        """Return every output that the record allows, in the order of the chain."""
+        """Return every output that the record allows, in the order of the chain.
+
+        An aircraft alone has none of these stages; the airframe's are made by `airframe_outputs`.
+        """
+        if not self.rig.controls:
+            return []
         lacking = self.missing()
         makers = {
             "schedule": self._schedule,
@@ -176,12 +178,12 @@ class Reader(Reading):
         own = noise_in(self.rig, self.name_of("gradient"), gradient[ran])
         smooth = smoothed(pressure)
 
-        at = self.as_read("computed") - neutral(self) if self.schedule.curved else None
+        at = self.as_read("computed") - self.neutral() if self.schedule.curved else None
 
         def predict(rig: Rig, q: Floats = smooth) -> Floats:
             missed = self.missed.under(rig, self.control)
             made = replay_schedule(rig, self.control, q, missed=missed, computed=at)
-            return made * left(self)
+            return made * self.feel_left()
 
         share, rest = share_from_source(gradient[ran], predict(self.rig, pressure)[ran])
         if share > SMALL:
@@ -252,7 +254,7 @@ class Reader(Reading):
             return predicted(driven(force.with_error(k), seen), 2.0**0.5)(rig)
 
         force = self._without_answered_noise(force, computed)
-        trembling = Nodes(force.passed(np.random.default_rng(SAMPLED)))
+        trembling = Nodes(force.passed(np.random.default_rng(47)))
         answer = driven(force.smooth, smooth)
         walks = force.smooth is not force.recorded
         walks = walks and creeps(self.rig, self.control, answer, own.rms)
@@ -328,7 +330,7 @@ class Reader(Reading):
         computed, measured = self.signal("computed"), self.signal("deflection")
         command, force = self.commanded(), self.pulled()
         others = {name: smoothed(signal) for name, signal in self.others().items()}
-        rng = np.random.default_rng(SAMPLED)
+        rng = np.random.default_rng(47)
         noise = Nodes(command.passed(rng)), force.passed(rng)
 
         def driven(c: Floats, f: Floats, otherwise: bool = False) -> Predict:
@@ -371,7 +373,7 @@ class Reader(Reading):
         if points is None:
             return []
         commands_at, positions = points
-        estimate, measured = asked(self), self.record[self.surface]
+        estimate, measured = self.asked(), self.record[self.surface]
         trim = trim_of(self.rig, self.record, self.control)
         filed = filed_trim(self.rig, self.control)
         held = 0.0 if trim is None else about(trim.position, filed, points)

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from coupled.flight.aircraft import make_aircraft
 from coupled.flight.airframe import JSBSimAirframe
@@ -21,7 +20,7 @@ from coupled.flight.altered import STILL, UNALTERED
 from coupled.gap.noise.smooth import Smoother, smoothed
 from coupled.gap.signals.conditions import trim_shift
 from coupled.gap.signals.floors import left_noise
-from coupled.gap.signals.output import estimate_noise
+from coupled.gap.signals.output import Floats, estimate_noise
 from coupled.gap.stages.openloop import Moved, Points, about
 from coupled.gap.thresholds import (
     KNOWN,
@@ -46,8 +45,6 @@ from coupled.rig.replay import replay_surface
 from coupled.rig.rig import Rig
 from coupled.rig.serving import service_rows
 from coupled.schema import changed
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -131,10 +128,8 @@ def _moves_itself(
 
 def filed_trim(rig: Rig, control: ControlName) -> float:
     """Return a surface's position in the trim to which `surface_points` refers, rad."""
-    assert rig.flight is not None
-    plain = changed(rig.flight, UNALTERED, rig.name, "flight")
-    controls = flown_by(rig)
-    return _trim(plain.model_dump_json(), controls, rig.frame_rate)[controls.index(control)]
+    flight, controls, rate_Hz = _unaltered(rig)
+    return _trim(flight, controls, rate_Hz)[controls.index(control)]
 
 
 def own_trim(rig: Rig, control: ControlName) -> float:

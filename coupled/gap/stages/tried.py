@@ -9,11 +9,16 @@ The library says in which stages an effect shows. What a record holds changes th
     a wheel, or no length of arm   the grip's arc has no radius
     no lateral motion              effects that show in it are not tried; nor are those of parts
                                    that the aircraft's model lacks
+
+If asked for, the named functions of the model's aerodynamics are tried. A function is freed if its
+share of its axis in a record is at least `NEGLIGIBLE`. The shares are those of the filed model,
+flown with the record's surfaces. The functions replace the effects of the library that scale the
+aerodynamics, since each such effect is a part of some functions.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import cache, partial
 from itertools import product
@@ -21,33 +26,44 @@ from itertools import product
 import numpy as np
 from scipy.linalg import eigh
 
+from coupled.errors import InputError
 from coupled.flight.airframe import main_file
 from coupled.flight.altered import ALTERATIONS, parts_of
+from coupled.flight.modelparts import Thrust
+from coupled.flight.modeltext import functions_of
+from coupled.gap.effects.airframe import term
 from coupled.gap.effects.effect import BY_REGRESSOR, Effect, Parameter, dotted, keys_of
-from coupled.gap.effects.scales import Scales, in_scale
+from coupled.gap.effects.settings import Scales, in_scale
 from coupled.gap.noise.smooth import smoothed
 from coupled.gap.signals.output import Floats, Output, estimate_noise
+from coupled.gap.stages.airframe import RATE, needs
+from coupled.gap.stages.openloop import flown_in, fly_open_loop
 from coupled.gap.stages.stages import Reader
+from coupled.gap.stages.surfaces import flown_by, moved
 from coupled.gap.thresholds import (
-    LATERAL_MOVES,
     MISMATCH,
+    MORE,
+    NEGLIGIBLE,
     PLAYS,
-    REACHED_BEYOND,
     REACHED_OVER,
     REPLAY_KNOWN,
+    SIGMAS,
     SMALL,
 )
 from coupled.record.channels import LATERAL, ControlName, channel, unit_of
 from coupled.record.record import Record
 from coupled.resources import aircraft_folder
 from coupled.rig.rig import Rig
+from coupled.surveying.terms import shares
 
 OF_PLAY = "loader.play"  # its key in a rig file without the unit, and that of its contact
 CONTACT = "loader.play_stiffness_N_per_{d}"
 ARC = "loader.arc_geometry"
 GRAVITY = "loader.gravity_N"
 PARTS = {alteration.part.name for alteration in ALTERATIONS}
+_AERODYNAMIC = {f"flight.{a.part.name}" for a in ALTERATIONS if not isinstance(a.part, Thrust)}
 RATE_LIMIT = "loader.servo_rate_limit_{d}_per_s"
+TERMS_OPTION = "--terms"
 
 
 def tried_effects(
@@ -131,7 +147,7 @@ def _moves(name: str, record: Record) -> bool:
     if name not in record:
         return False
     noise = estimate_noise(record[name]).rms
-    return float(np.std(record[name])) > LATERAL_MOVES * noise
+    return float(np.std(record[name])) > MORE * noise
 
 
 def as_judged(
@@ -257,7 +273,43 @@ def _reached(grip: Floats, record: Record) -> float:
     A play only makes it slower than the servo; a bend would add to it, but is not considered.
     """
     rate_Hz = (len(grip) - 1) / float(record.time_s[-1] - record.time_s[0])
-    noise = REACHED_BEYOND * estimate_noise(grip).rms
+    noise = 2.0 * SIGMAS * estimate_noise(grip).rms  # of the two ends of a way
     over = [n for n in REACHED_OVER if n < len(grip)]
     way = [float(np.max(np.abs(grip[n:] - grip[:-n]))) - noise for n in over]
     return max([rate_Hz * w / n for n, w in zip(over, way, strict=True)], default=0.0)
+
+
+def with_terms(library: Sequence[Effect], rig: Rig, records: Mapping[str, Record]) -> list[Effect]:
+    """Return a library with the model's functions in place of effects of the aerodynamics.
+
+    Raises InputError for a model without named functions, and for a record without channels that
+    the airframe needs.
+    """
+    assert rig.flight is not None
+    axes = functions_of(main_file(rig.flight, [aircraft_folder()], rig.name))
+    if not axes:
+        raise InputError(
+            rig.name,
+            TERMS_OPTION,
+            f"{rig.flight.model} has no named aerodynamic functions; leave it out",
+        )
+    large = set[str]()
+    for file, record in records.items():
+        lacking = [name for name in needs(rig, record) if name not in record]
+        if lacking:
+            problem = f"the record lacks {', '.join(lacking)}, which the airframe needs"
+            raise InputError(file, TERMS_OPTION, problem)
+        large |= large_terms(rig, record, axes)
+    kept = [one for one in library if not _AERODYNAMIC & {p.key for p in one.parameters}]
+    return [*kept, *(term(name, axis) for name, axis in axes.items() if name in large)]
+
+
+def large_terms(rig: Rig, record: Record, axes: Mapping[str, str]) -> set[str]:
+    """Return the functions whose share of their axis in a record is at least `NEGLIGIBLE`."""
+    assert rig.flight is not None
+    controls = flown_by(rig)
+    surfaces, _ = moved(rig, record, {}, np.random.default_rng(43))
+    given = (rig.flight, rig.frame_rate, controls, surfaces, (RATE, *axes))
+    flown = fly_open_loop(*given, flown_in(record, controls, rig.frame_rate))
+    values = dict(zip(axes, flown.motion[:, 1:].T, strict=True))
+    return {one.term for one in shares(axes, values) if (one.share or 0.0) >= NEGLIGIBLE}
