@@ -34,6 +34,19 @@ def test_an_interval_counts_what_is_known_of_a_setting(spread: float) -> None:
     assert alone[0] < half[0]
 
 
+def test_numbers_that_are_known_beforehand_take_no_degree_of_freedom() -> None:
+    """Five stretches; one number that the data determine, and six that only their priors do."""
+    rng = np.random.default_rng(3)
+    left = np.convolve(rng.normal(size=FRAMES), np.ones(30), "same")  # too smooth for more
+    groups = np.arange(FRAMES) // (FRAMES // 5)
+    slopes = np.column_stack((np.ones(FRAMES), 1e-3 * rng.normal(size=(FRAMES, 6))))
+    found = End(np.zeros(7), 0.0, left - left.mean(), slopes, None)
+    priors = np.array([0.0, *np.ones(6)])
+    half = half_width(found, 1, groups, priors, NONE)
+    alone = half_width(replace(found, jac=slopes[:, :1]), 1, groups, np.zeros(1), NONE)
+    assert half[0] < 3.0 * alone[0]
+
+
 def test_an_error_of_the_input_that_lasts_widens_an_interval_as_it_moves_the_estimate() -> None:
     """Three samples e of an error along J move the estimate by their sizes: Student's t."""
     rng = np.random.default_rng(5)

@@ -20,6 +20,8 @@ from tests.support.machines import (
     duffing_rig,
     motor,
     motor_rig,
+    slider,
+    slider_rig,
 )
 
 
@@ -59,6 +61,42 @@ def test_a_hardening_spring_and_a_damping_are_found_under_a_broadband_force(to_H
     assert [effect.name for effect in damping.effects] == ["viscous_damping"]
     assert damping.effects[0].value == pytest.approx(1.0 / 0.7, rel=0.02)
     assert damping.verdict == spring.verdict == "effect"
+
+
+@pytest.mark.parametrize("factor", [0.6, 1.9])
+def test_the_damping_of_a_slow_machine_without_a_spring_is_found(factor: float) -> None:
+    """Restarted four times a second, a machine of 1.7 s followed a record of any damping."""
+    found = diagnose(slider_rig(), {"r": slider(1, factor)})
+    (damping,) = found.effects
+    assert (damping.name, found.verdict) == ("viscous_damping", "effect")
+    assert damping.value == pytest.approx(factor, rel=0.02)
+    (p,) = damping.parameters
+    assert p.low is not None and p.high is not None and p.low <= factor <= p.high
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_that_machine_has_no_gap_beside_its_own_numbers(seed: int) -> None:
+    assert diagnose(slider_rig(), {"r": slider(seed)}).verdict == "no_gap"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [12, 14, 15])
+def test_a_damping_is_as_sure_whichever_of_equal_laws_stands_beside_it(seed: int) -> None:
+    """Five stretches for seven numbers, of which priors know four, left no degree of freedom."""
+    found = diagnose(motor_rig(), {"r": motor(seed, seconds=10.0 + 2.0 * (seed % 6))})
+    known = {effect.name: effect for effect in found.effects}
+    assert known["viscous_damping"].probability >= 0.6
+    assert known["viscous_damping"].value == pytest.approx(2.0, rel=0.05)
+
+
+@pytest.mark.slow
+def test_of_alternatives_one_whose_size_is_determined_is_reported() -> None:
+    """Dry friction one way is also an offset; its own interval may contain zero."""
+    found = diagnose(motor_rig(), {"r": motor(14, seconds=14.0)})
+    assert len(found.rivals[0]) > 2
+    for effect in found.effects:
+        sizes = [p for p in effect.parameters if p.name in ("friction_N", "offset_N", "pull_N")]
+        assert all(p.low is not None and p.high is not None and p.low * p.high > 0 for p in sizes)
 
 
 @pytest.mark.slow

@@ -267,6 +267,28 @@ def sprung_rig(rate_Hz: float = 100.0) -> Rig:
 MOTOR_kg, MOTOR_DAMPING, MOTOR_DRY_N = 1.2e-4, 1.4e-4, 0.03
 
 
+def slider(seed: int, factor: float = 1.0, noise_m: float = 2e-3) -> Record:
+    """Return 20 s of a mass of 1 kg with damping, pushed one way by steps of force, at 50 Hz.
+
+    m·x'' + c·x' = F, c = `factor` · 0.6 N·s/m, in closed form over each frame.
+    """
+    rng, rate_Hz, frames, damping = np.random.default_rng(seed), 50.0, 1000, 0.6 * factor
+    force = 0.6 + np.repeat(rng.uniform(0.0, 1.4, 20), 50)
+    kept = np.exp(-damping / rate_Hz)
+    speed, way = 0.0, np.zeros(frames)
+    for k, pull in enumerate(force[:-1].tolist()):
+        steady = pull / damping
+        way[k + 1] = way[k] + steady / rate_Hz + (speed - steady) * (1.0 - kept) / damping
+        speed = steady + (speed - steady) * kept
+    return recorded(rate_Hz, force_N=force, computed_m=way + noise_m * rng.normal(size=frames))
+
+
+def slider_rig() -> Rig:
+    """Return the rig of that mass, with a `factor` of one."""
+    rig = plain_rig(50.0, {"mass_kg": 1.0, "damping_N_s_per_m": 0.6})
+    return rig.changed({"controls.column.travel_m": 1000.0})
+
+
 def motor(seed: int = 1, seconds: float = 20.0, rate_Hz: float = 50.0) -> Record:
     """Return a record of a motor that turns one way, under two levels of torque.
 

@@ -3,7 +3,8 @@
 The first assumes a stationary residual with a correlation time. The second is the sandwich
 estimator from the scatter of the score between stretches (White, Econometrica 48, 1980); it
 includes misfit, and needs more stretches than parameters. The stretches of a short record are
-therefore divided into parts much longer than the residual's correlation time (`memory`).
+therefore divided into parts much longer than the residual's correlation time (`memory`). Parameters
+that only their priors determine take no degree of freedom of Student's t.
 
 Neither sees an error of the input that lasts: the fit takes it for the parameters' effect. The
 third is the scatter of the estimates (JᵀJ)⁻¹·Jᵀ·e of samples e of the input's propagated error.
@@ -35,7 +36,8 @@ def half_width(found: End, outputs: int, groups: Numbers, known: Floats, errors:
     variance, widen = _counted(left, outputs)
     before = np.diag(known)
     plain = np.linalg.pinv(jacobian.T @ jacobian / (variance * widen) + before)
-    bread = np.linalg.pinv(jacobian.T @ jacobian / variance + before)
+    slopes = jacobian.T @ jacobian / variance
+    bread = np.linalg.pinv(slopes + before)
     parts = cut(groups, jacobian.shape[1], widen)
     names, number = np.unique(parts, return_inverse=True)
     scores = np.zeros((len(names), jacobian.shape[1]))
@@ -44,7 +46,8 @@ def half_width(found: End, outputs: int, groups: Numbers, known: Floats, errors:
     scatter = scores.T @ scores * (len(names) / freedom) / variance**2
     filled = bread @ (scatter + before) @ bread
     square = np.maximum(np.maximum(np.diag(plain), np.diag(filled)), 0.0)
-    half = stdtrit(freedom, 0.975) * np.sqrt(square)
+    determined = float(np.trace(bread @ slopes))  # parameters that the data determine
+    half = stdtrit(max(1.0, len(names) - determined), 0.975) * np.sqrt(square)
     if len(errors):
         moved = (errors @ jacobian / variance) @ bread
         half = np.maximum(half, stdtrit(len(errors), 0.975) * np.sqrt(np.mean(moved**2, axis=0)))

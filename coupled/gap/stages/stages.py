@@ -57,9 +57,11 @@ from coupled.gap.thresholds import (
     NEARLY_ALL,
     REPLAY_KNOWN,
     ROUNDING_SPAN,
+    SIGMAS,
     SMALL,
     TRIES,
     PIECE_s,
+    STRETCH_s,
 )
 from coupled.parallel import in_threads
 from coupled.rig.hosted import Hosted
@@ -207,17 +209,16 @@ class Reader(Reading):
             self.channel_noise("computed"),
         )
         leaks = [Nodes(smoothed(other)) for other in self.partner()]
-        every = self._restarts(round(PIECE_s * self.rig.frame_rate))
         restarted = drifts(self.rig, self.control, float(np.min(feel.gradient)))
-        own_starts = every if restarted else self._restarts()
 
         def driven(
-            f: Floats, seen: Floats, starts: Mask = own_starts, otherwise: bool = False
+            f: Floats, seen: Floats, starts: Mask | None = None, otherwise: bool = False
         ) -> Driven:
             """Return the response to a force plus a multiple of its noise, with restarts.
 
             `otherwise`: force and services between the frames are interpolated more coarsely.
             """
+            starts = own_starts if starts is None else starts
             nodes = Nodes(f, coarsely if otherwise and jumps(f) else on_nodes)
             misread = computed - seen
             rate = rate_of(seen, self.rig.frame_rate) if starts.any() else seen
@@ -254,6 +255,11 @@ class Reader(Reading):
             return predicted(driven(force.with_error(k), seen), 2.0**0.5)(rig)
 
         force = self._without_answered_noise(force, computed)
+        own_starts = self._restarts()
+        if restarted:
+            own_starts = self._restarts_that_show(
+                lambda f, starts: driven(f, smooth, starts)(self.rig, 0.0), force.smooth, own.rms
+            )
         trembling = Nodes(force.passed(np.random.default_rng(47)))
         answer = driven(force.smooth, smooth)
         walks = force.smooth is not force.recorded
@@ -263,12 +269,27 @@ class Reader(Reading):
         driven_by = DrivenBy("force", _rms(between - answer(self.rig, 0.0)))
         whole = self._made("loader", *made, driven_by, judged=self.judged).under(force.noise)
         if not restarted:
+            every = self._restarts(round(PIECE_s * self.rig.frame_rate))
             shot = driven(force.smooth, smooth, every)
             shots = self._judged(lambda rig: shot(rig, 0.0), computed)
             whole = replace(whole, shots=shots)
         if not walks:
             return [whole]
         return [replace(whole, rough=self._judged(lambda rig: answer(rig, 0.0), computed))]
+
+    def _restarts_that_show(
+        self, moved: Callable[[Floats, Mask], Floats], force: Floats, noise: float
+    ) -> Mask:
+        """Return restarts so far apart that a tenth more force shows beyond the noise.
+
+        A slow machine that is restarted often follows any record, whatever its damping.
+        """
+        for times in (1, 2, 4):
+            starts = self._restarts(round(times * PIECE_s * self.rig.frame_rate))
+            more = moved((1.0 + SMALL) * force, starts) - moved(force, starts)
+            if _rms(more) > SIGMAS * noise:
+                return starts
+        return self._restarts(round(STRETCH_s * self.rig.frame_rate))
 
     def _restarts(self, every: int = 0) -> Mask:
         """Return the frames at which a replay restarts as measured; also every `every` frames."""
