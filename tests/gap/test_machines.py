@@ -79,6 +79,21 @@ def test_that_machine_has_no_gap_beside_its_own_numbers(seed: int) -> None:
     assert diagnose(slider_rig(), {"r": slider(seed)}).verdict == "no_gap"
 
 
+@pytest.mark.parametrize(
+    ("factor", "verdict"), [(1.0, "no_gap"), (1.25, "ambiguous"), (1.5, "ambiguous")]
+)
+def test_noise_that_may_be_coloured_lets_no_one_say_that_there_is_no_gap(
+    factor: float, verdict: str
+) -> None:
+    """A force in dense steps shows no noise between them; a gap of 5 floors was "no gap"."""
+    found = diagnose(slider_rig(), {"r": slider(1, factor)})
+    assert (found.verdict, found.effects) == (verdict, ())
+    if verdict == "ambiguous":
+        assert "may be coloured noise of its input" in found.summary
+        assert found.next_test.startswith("Record an input that changes more slowly")
+        assert found.stage("loader").as_dict()["judged"] is False
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [12, 14, 15])
 def test_a_damping_is_as_sure_whichever_of_equal_laws_stands_beside_it(seed: int) -> None:

@@ -103,7 +103,10 @@ class Judge:
         outputs = [output for output in self.outputs if output.stage == stage]
         known = [output.hidden_gap for output in outputs if output.hidden_gap is not None]
         least = min(known, key=lambda one: one.share, default=None)
-        return least if least is not None and least.much else None
+        if least is not None and least.much:
+            return least
+        doubtful = (output.coloured(self.choice.without_effects.rig) for output in outputs)
+        return next((one for one in doubtful if one is not None), None)
 
     def _lacking(self) -> dict[str, tuple[str, ...]]:
         """Return the channels that each stage lacks in every record."""

@@ -61,12 +61,14 @@ class HiddenGap:
 
     `noisiest` is the channel whose noise dominates the floor, `channel` that of the output.
     `misses` is the gap of the healthy records, if the floor includes a model error; else 0.
+    `coloured` is a gap that noise of the input may cause, if its colour is too uncertain; else 0.
     """
 
     share: float
     noisiest: str
     channel: str
     misses: float = 0.0
+    coloured: float = 0.0
 
     @property
     def much(self) -> bool:
@@ -81,6 +83,8 @@ class HiddenGap:
     @property
     def words(self) -> str:
         """The reason in words."""
+        if self.coloured:
+            return f"its gap of {self.coloured:.2g} noise floors may be coloured noise of its input"
         if self.still:
             return f"{self.channel} shows little but noise"
         share = f"{100 * self.share:.0f} %" if self.share < 1.0 else "more than the whole"
@@ -94,6 +98,8 @@ class HiddenGap:
         """How to lower the floor, in a sentence."""
         if self.misses:
             return "Fit the rig to the healthy record first (coupled fit), then diagnose again."
+        if self.coloured:
+            return "Record an input that changes more slowly or more rarely: that shows its noise."
         if self.still:
             return f"Record a force that moves {self.channel}, or {self.noisiest} with less noise."
         larger = f"{math.ceil(self.share / SMALL)} times as large"
@@ -225,8 +231,23 @@ class Output:
     @property
     def limit(self) -> float:
         """The largest gap of noise alone."""
-        noise = 1.0 + SIGMAS * self.spread + SMOOTHING_LOST * self.smoothed
-        return max(FAULTY_FROM, noise * (1.0 + self.unsure), 1.0 + self.mismatch)
+        return max(self.sure_limit, self._largest * (1.0 + self.unsure))
+
+    @property
+    def sure_limit(self) -> float:
+        """The same if the colour of the input's noise is as estimated."""
+        return max(FAULTY_FROM, self._largest, 1.0 + self.mismatch)
+
+    @property
+    def _largest(self) -> float:
+        return 1.0 + SIGMAS * self.spread + SMOOTHING_LOST * self.smoothed
+
+    def coloured(self, rig: Rig) -> HiddenGap | None:
+        """Return the gap that coloured noise of the input may cause, if it may double the floor."""
+        gap = self.gap(rig)
+        if self.hidden_gap is None or self.unsure <= 1.0 or gap <= self.sure_limit:
+            return None
+        return replace(self.hidden_gap, coloured=gap)
 
     @property
     def does(self) -> float:
