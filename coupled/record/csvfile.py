@@ -36,6 +36,7 @@ def read_columns(path: Path, gaps: bool = False, torn: bool = False) -> dict[str
         if path.suffix.lower() == ".parquet":
             table = pl.read_parquet(content)
         else:
+            _check_commas(path, held.partition(b"\n")[0])
             table = pl.read_csv(content, infer_schema=False)
     except (pl.exceptions.PolarsError, OSError) as error:
         raise InputError(path, "", f"is not a table: {first_line(error)}") from None
@@ -43,6 +44,14 @@ def read_columns(path: Path, gaps: bool = False, torn: bool = False) -> dict[str
     if doubled:
         raise InputError(path, doubled[0].partition("_duplicated_")[0], "duplicate column")
     return {name: numbers(path, name, table[name], gaps) for name in table.columns}
+
+
+def _check_commas(path: Path, head: bytes) -> None:
+    """Refuse a table whose first line has another separator and no comma."""
+    for mark, name in ((b";", "semicolons"), (b"\t", "tabs")):
+        if mark in head and b"," not in head:
+            problem = f"is separated by {name}; separate by commas, or read a log by coupled import"
+            raise InputError(path, "", problem)
 
 
 def write_table(frame: pl.DataFrame, path: Path) -> None:

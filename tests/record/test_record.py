@@ -54,6 +54,14 @@ def test_a_column_that_holds_no_numbers_is_refused(tmp_path: Path, column: pl.Se
         read_record(path)
 
 
+@pytest.mark.parametrize(("mark", "name"), [(";", "semicolons"), ("\t", "tabs")])
+def test_another_separator_is_named(tmp_path: Path, mark: str, name: str) -> None:
+    rows = ("time_s", "column_force_N"), ("0.0", "NaN"), ("0,1", "1.5")
+    (tmp_path / "r.csv").write_text("\n".join(mark.join(row) for row in rows))
+    with pytest.raises(InputError, match=rf"r\.csv: is separated by {name}; .* coupled import"):
+        read_record(tmp_path / "r.csv")
+
+
 def test_an_old_manifest_is_read_and_a_newer_one_refused_by_name(tmp_path: Path) -> None:
     path = tmp_path / "r.csv"
     write_record(RECORD, path)
