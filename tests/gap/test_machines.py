@@ -18,6 +18,8 @@ from tests.support.machines import (
     MOTOR_DRY_N,
     duffing,
     duffing_rig,
+    held_force,
+    held_force_rig,
     motor,
     motor_rig,
     slider,
@@ -92,6 +94,24 @@ def test_noise_that_may_be_coloured_lets_no_one_say_that_there_is_no_gap(
         assert "may be coloured noise of its input" in found.summary
         assert found.next_test.startswith("Record an input that changes more slowly")
         assert found.stage("loader").as_dict()["judged"] is False
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("noise_N", [0.0, 0.1])
+@pytest.mark.parametrize("factor", [1.1, 1.4])
+def test_an_effect_is_not_left_to_a_parameter_far_beyond_its_tolerance(
+    factor: float, noise_N: float
+) -> None:
+    """A force held for each frame comes half a frame late; it is read as in between.
+
+    With the damping at ten standard deviations of its prior, a skew alone left noise.
+    """
+    found = diagnose(held_force_rig(), {"r": held_force(1, factor, noise_N)})
+    known = {effect.name: effect for effect in found.effects}
+    assert found.verdict == "effect"
+    assert known.keys() == {"viscous_damping", "force_skew"}
+    assert known["viscous_damping"].value == pytest.approx(factor, rel=0.01)
+    assert known["force_skew"].value == pytest.approx(-0.005, abs=0.0005)
 
 
 @pytest.mark.slow

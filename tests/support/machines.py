@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
+from scipy.linalg import expm
 
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
@@ -287,6 +288,30 @@ def slider_rig() -> Rig:
     """Return the rig of that mass, with a `factor` of one."""
     rig = plain_rig(50.0, {"mass_kg": 1.0, "damping_N_s_per_m": 0.6})
     return rig.changed({"controls.column.travel_m": 1000.0})
+
+
+def held_force(seed: int, factor: float = 1.0, noise_N: float = 0.0) -> Record:
+    """Return 30 s of a mass on a spring, 2 kg and 400 N/m, under ±10 N, each held for 0.4 s.
+
+    The damping is `factor` · 30 N·s/m. Each sample of the force is held until the next, 10 ms, in
+    closed form.
+    """
+    rng, rate_Hz, frames = np.random.default_rng(seed), 100.0, 3000
+    force = np.repeat(rng.choice([-10.0, 10.0], frames // 40), 40)
+    rates = np.array([[0.0, 1.0, 0.0], [-200.0, -15.0 * factor, 0.5], [0.0, 0.0, 0.0]])
+    step = expm(rates / rate_Hz)
+    state, way = np.zeros(2), np.empty(frames)
+    for k, pull in enumerate(force.tolist()):
+        way[k] = state[0]
+        state = step[:2, :2] @ state + step[:2, 2] * pull
+    hiss = rng.normal(size=(2, frames))
+    seen = {"force_N": force + noise_N * hiss[0], "computed_m": way + 2e-5 * hiss[1]}
+    return recorded(rate_Hz, **seen)
+
+
+def held_force_rig() -> Rig:
+    """Return the rig of that mass, with a `factor` of one."""
+    return plain_rig(100.0, {"mass_kg": 2.0, "damping_N_s_per_m": 30.0}, 400.0)
 
 
 def motor(seed: int = 1, seconds: float = 20.0, rate_Hz: float = 50.0) -> Record:

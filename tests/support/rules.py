@@ -104,6 +104,8 @@ RULES = (
          "discrete effects are fitted without screening", "_search_by_depth"),
     Rule("relief", "search.beam:Beam.worth", without_relief,
          "screening deducts the nuisance parameters' penalty"),
+    Rule("strained", "search.beam:relief_of", gives(0.0),
+         "a set is explained only within the nuisance parameters' tolerance", "open_outputs"),
     Rule("best_first", "search.screen:Screen.still_worth", third,
          "once the most promising candidate is fitted, others must still be worth a fit"),
     Rule("smooth_error", "search.problem:ModelError.smooth",

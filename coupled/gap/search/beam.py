@@ -179,8 +179,8 @@ class Beam:
         set is behind the best one: a prediction may show half of a gain. The nuisance parameters'
         prior penalty is deducted: the effect may remove it.
         """
-        relief = sum(group.penalty for group in fitted.groups.values())
-        return Worth(PRIOR_EFFECT + share * self.behind(fitted) - relief, self.counts)
+        needed = PRIOR_EFFECT + share * self.behind(fitted) - relief_of(fitted)
+        return Worth(needed, self.counts)
 
     def log_of(self, fitted: Fit) -> float:
         """Return the log evidence of a fit, possibly not of this beam."""
@@ -191,9 +191,17 @@ class Beam:
         return max(self.log(self.best) - self.log_of(fitted), 0.0)
 
     def open_outputs(self, names: Names) -> set[str]:
-        """Return the outputs whose residual exceeds the noise and the model error with a set."""
-        case = self.problem.case
-        rig = self.fits[names].rig if names else self.without_effects.rig
+        """Return the outputs whose residual exceeds the noise and the model error with a set.
+
+        If the prior penalty of its nuisance parameters would pay for an effect, these may have
+        absorbed one: the residual is then that within their tolerance.
+        """
+        case, fitted = self.problem.case, self.fits[names] if names else self.without_effects
+        if relief_of(fitted) > PRIOR_EFFECT:
+            return self.unexplained(
+                stage_gaps(case.outputs, self.problem.within_tolerance(fitted).rig)
+            )
+        rig = fitted.rig
         return self.unexplained(
             case.gaps(rig) if names == self.best else stage_gaps(case.outputs, rig)
         )
@@ -207,6 +215,11 @@ class Beam:
             for at, limit in limits.items()
         }
         return {at for at, gap in gaps.items() if gap > explained[at]}
+
+
+def relief_of(fitted: Fit) -> float:
+    """Return the prior penalty of a fit's nuisance parameters, which another effect may remove."""
+    return sum(group.penalty for group in fitted.groups.values())
 
 
 def names_of(effects: Iterable[Effect]) -> Names:
@@ -378,8 +391,11 @@ def _fit_neighbours(beam: Beam, fitted: Fit, library: Sequence[Effect], wanted: 
     fitted before. Effects are screened with the nuisance parameters within their tolerance: beyond
     it they may have absorbed an effect.
     """
-    is_best, fitted = names_of(fitted.effects) == beam.best, beam.problem.within_tolerance(fitted)
-    beside, worth = _candidates(fitted.effects, library, wanted), beam.worth(fitted)
+    is_best, found, worth = names_of(fitted.effects) == beam.best, fitted, beam.worth(fitted)
+    fitted, beside = (
+        beam.problem.within_tolerance(found),
+        _candidates(found.effects, library, wanted),
+    )
     many = BEAM_CANDIDATES if is_best else TRIES
     screened = beam.screen.best(fitted, beside, worth, many, anew=is_best)
     if not screened and is_best and (pair := beam.screen.pair(fitted, beside, worth)):
@@ -388,7 +404,7 @@ def _fit_neighbours(beam: Beam, fitted: Fit, library: Sequence[Effect], wanted: 
     plain = [one for one in screened if not any(contains(one.effect, e) for e in effects)]
     ends = list[Fit]()
     for some in (plain[:1], plain[1:]):
-        still = beam.screen.still_worth(fitted, some, beam.worth(fitted, MOST))
+        still = beam.screen.still_worth(fitted, some, beam.worth(found, MOST))
         dry = next((one for one in still if one.effect.dry), None)
         if dry is not None and not beam.contact:
             first = _fit_sets(beam, _starts_with_one_more(fitted, dry, {}))
