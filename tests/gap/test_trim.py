@@ -127,8 +127,9 @@ def test_a_model_in_its_own_trim_stays_there_by_surfaces_that_do_not_move(rig: R
         ({"pitch_stiffness": {"factor": 0.8}}, True),
         ({"rigging_offset": {"offset_norm": 0.001}}, False),
         ({"rigging_offset": {"offset_norm": 0.02}}, False),
+        ({"mass": {"factor": 1.1}, "rigging_offset": {"offset_norm": -0.03}}, True),
     ],
-    ids=["as filed", "mass", "stiffness", "small offset", "offset"],
+    ids=["as filed", "mass", "stiffness", "small offset", "offset", "mass and offset"],
 )
 def test_a_trim_is_distinguished_from_an_offset(
     tmp_path: Path, rig: Rig, values: dict[str, dict[str, float]], elsewhere: bool
@@ -138,9 +139,10 @@ def test_a_trim_is_distinguished_from_an_offset(
     assert found is not None
     place = own_trim(rig, "column")
     if elsewhere:
-        ((name, numbers),) = values.items()
+        name, numbers = next(iter(values.items()))
         place = own_trim(real(rig, name, numbers["factor"]), "column")
     assert found.position == pytest.approx(place, abs=1e-9 if not elsewhere else 4 * found.error)
+    assert (found.jump != 0.0) is ("rigging_offset" in values)
 
 
 @pytest.mark.parametrize(

@@ -4,8 +4,8 @@ A record starts in trim. A surface that differs from the model's trim by more th
 two causes. If the aircraft trims elsewhere (other weight, lift or moment), the first row is
 there too, and the aircraft stays in trim. If something moved the surface afterwards (a rigging
 offset), the aircraft responds. The two are compared by the first row, and by the model's residual
-in open-loop flight. Without evidence the aircraft's trim is assumed; for a record without motion, a
-fault of the surface.
+in open-loop flight. If the first row excludes each alone, both are present. Without evidence the
+aircraft's trim is assumed; for a record without motion, a fault of the surface.
 
 The trim is also an output that is compared with the model's trim. With the angle of attack in trim
 it discriminates lift, moment and weight.
@@ -34,6 +34,7 @@ from coupled.gap.stages.surfaces import (
 )
 from coupled.gap.thresholds import (
     FIRST_ROWS,
+    KNOWN,
     PARTLY,
     RIVAL_GAIN,
     TRIM_ANSWERED,
@@ -68,6 +69,9 @@ def trim_of(rig: Rig, record: Record, control: ControlName) -> Trim | None:
     if abs(standing) <= TRIM_SIGMAS * error:
         return Trim(own, own + standing, error)
     there = own + standing
+    unsure = math.hypot(noise, KNOWN)
+    if min(abs(first - own), abs(first - there)) > TRIM_SIGMAS * unsure:  # both causes
+        return Trim(first, first, unsure, there - first)
     evidence = ((first - own) ** 2 - (first - there) ** 2) / max(noise, 1e-12) ** 2
     flown = _followed(rig, record, control, own, there)
     in_trim = evidence > RIVAL_GAIN if flown is None else evidence + flown > -RIVAL_GAIN
