@@ -193,7 +193,6 @@ VERY_STRONG = 5.0  # error rate: log evidence, 2 ln B > 10 (Kass and Raftery 199
 OTHER_ALTITUDE_m = 100.0  # tolerance: of the trim's altitude; 1 % of the air's density
 SHORT_SWINGS = 4  # error rate: of a short record: both halves hold motion in both directions
 SHOT_TRIES = 3  # step: samples of the error of restarts, of which each segment has one; chosen
-FIRST_ROWS = 12  # step: least rows before a surface moves, by which its trim is measured; chosen
 
 # Curves of one signal (`curves`, `curvefit`).
 CURVE_NODES = 18  # step: most nodes; a rig file takes 24, and differences add up to three

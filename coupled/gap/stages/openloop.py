@@ -5,13 +5,12 @@ its surface positions in trim (`trim`). The surfaces' deflections from there are
 model's own trim, so that the model does not start with a transient from one trim to the other. A
 measured trim has an error, which would act on a model as a constant deflection, and its attitude
 would drift. If the model's own trim is within that error, the record's trim is therefore taken to
-be the model's own; from twice the error on, it is the measured one. In between the deflections are
-moved by a growing part of the difference.
+be the model's own; beyond, it is the measured one. In between would be a barrier: a deflection of
+up to the error, in a model that trims elsewhere.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from threading import Lock
@@ -84,8 +83,7 @@ class Moved:
         if self.points is None:
             return self.values
         off = own - self.trim
-        beyond = min(max(2.0 * (abs(off) - self.unsure), 0.0), abs(off))
-        moved = math.copysign(beyond, off) if beyond > SAME_TRIM_rad else 0.0
+        moved = off if abs(off) > max(self.unsure, SAME_TRIM_rad) else 0.0
         return command_of(self.values + moved, self.points) - about(own, self.filed, self.points)
 
 

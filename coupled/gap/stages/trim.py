@@ -4,8 +4,8 @@ A record starts in trim. A surface that differs from the model's trim by more th
 two causes. If the aircraft trims elsewhere (other weight, lift or moment), the first row is
 there too, and the aircraft stays in trim. If something moved the surface afterwards (a rigging
 offset), the aircraft responds. The two are compared by the first row, and by the model's residual
-in open-loop flight. Without evidence the aircraft's trim is assumed; for a record without motion, a
-fault of the surface.
+in open-loop flight. If the first row excludes each alone, both are present. Without evidence the
+aircraft's trim is assumed; for a record without motion, a fault of the surface.
 
 The trim is also an output that is compared with the model's trim. With the angle of attack in trim
 it discriminates lift, moment and weight.
@@ -33,9 +33,10 @@ from coupled.gap.stages.surfaces import (
     surface_points,
 )
 from coupled.gap.thresholds import (
-    FIRST_ROWS,
+    KNOWN,
     PARTLY,
     RIVAL_GAIN,
+    SHORT_FRAMES,
     TRIM_ANSWERED,
     TRIM_SIGMAS,
     BRIEF_s,
@@ -68,6 +69,9 @@ def trim_of(rig: Rig, record: Record, control: ControlName) -> Trim | None:
     if abs(standing) <= TRIM_SIGMAS * error:
         return Trim(own, own + standing, error)
     there = own + standing
+    unsure = math.hypot(noise, KNOWN)
+    if min(abs(first - own), abs(first - there)) > TRIM_SIGMAS * unsure:  # both causes
+        return Trim(first, first, unsure, there - first)
     evidence = ((first - own) ** 2 - (first - there) ** 2) / max(noise, 1e-12) ** 2
     flown = _followed(rig, record, control, own, there)
     in_trim = evidence > RIVAL_GAIN if flown is None else evidence + flown > -RIVAL_GAIN
@@ -80,9 +84,9 @@ def _start_of(position: Floats, noise: float) -> tuple[float, float]:
     From the rows before it moves by more than noise: their mean, or the start of a parabola if that
     improves the fit.
     """
-    moves = np.abs(position - position[:FIRST_ROWS].mean()) > TRIM_SIGMAS * noise
+    moves = np.abs(position - position[:SHORT_FRAMES].mean()) > TRIM_SIGMAS * noise
     rows = int(np.argmax(moves)) if moves.any() else len(position)
-    if rows < FIRST_ROWS:
+    if rows < SHORT_FRAMES:
         return float(position[0]), noise
     seen, at = position[:rows], np.arange(rows)
     mean, parabola = float(seen.mean()), Polynomial.fit(at, seen, 2)
