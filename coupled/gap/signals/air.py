@@ -33,7 +33,7 @@ from scipy.linalg import solveh_banded
 
 from coupled.gap.noise.smooth import Smoother, rate_of, smoothed
 from coupled.gap.signals.output import Floats, estimate_noise, white
-from coupled.gap.thresholds import FIRST_ROWS, STIFFEST_AIR
+from coupled.gap.thresholds import SHORT_FRAMES, STIFFEST_AIR
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
 from coupled.units import GRAVITY_m_per_s2
@@ -104,7 +104,7 @@ def crossing_air(record: Record, frame_s: float, side_m_per_s2: Floats | None) -
     pushed = side_m_per_s2 * np.cos(roll) + normal * np.sin(roll)
     turned = cumulative_trapezoid(speed * ahead, np.unwrap(record["heading_rad"]), initial=0.0)
     rough = _summed(pushed, frame_s) - turned - speed * right
-    rough -= rough[:FIRST_ROWS].mean()
+    rough -= rough[:SHORT_FRAMES].mean()
     noise = rng.normal(0.0, white(roll), len(roll)) * normal
     return Air.of(rough, _summed(noise, frame_s), rng)
 
