@@ -70,6 +70,7 @@ def made(
     values: Mapping[str, Mapping[str, float]],
     seed: int,
     amplitude_N: float = 45.0,
+    noisier: float = 1.0,
 ) -> Record:
     """Return the noisy record of a rig that has the effects of `values`."""
     effects = [BY_NAME[name] for name in values]
@@ -77,7 +78,7 @@ def made(
     real = apply(nominal, "column", effects, flat)
     flown = nominal.flight is not None
     of_a_bench = ("column", "dynamic")
-    noise = {name: level for name, level in NOISE.items() if flown or name.startswith(of_a_bench)}
+    noise = {n: noisier * rms for n, rms in NOISE.items() if flown or n.startswith(of_a_bench)}
     real = real.changed({"noise": noise})
     t, force = pushes(seed, amplitude_N)
     rows = "".join(f"{a:.7f},{b:.6f}\n" for a, b in zip(t, force, strict=True))

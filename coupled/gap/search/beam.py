@@ -36,6 +36,7 @@ from coupled.gap.thresholds import (
     BEAM_CANDIDATES,
     BEAM_DEPTH,
     BEAM_WIDTH,
+    CERTAIN,
     GIVEN_UP,
     MINOR,
     MORE,
@@ -196,7 +197,7 @@ class Beam:
         If the prior penalty of its nuisance parameters would pay for an effect, these may have
         absorbed one: the residual is then that within their tolerance.
         """
-        case, fitted = self.problem.case, self.fits[names] if names else self.without_effects
+        case, fitted = self.problem.case, self.fits[names]
         if relief_of(fitted) > PRIOR_EFFECT:
             return self.unexplained(
                 stage_gaps(case.outputs, self.problem.within_tolerance(fitted).rig)
@@ -265,7 +266,7 @@ def _search_from(
     """
     without_effects, case = problem.within_tolerance(known[0]), problem.case
     beam = Beam(problem, without_effects, problem.model_error(without_effects.rig))
-    for fitted in known:
+    for fitted in (without_effects, *known[1:]):
         beam.add(fitted)
     beam.recount()
     return beam, _search_by_depth(
@@ -636,12 +637,15 @@ def _choose(beam: Beam, rounds: tuple[dict[str, float], ...]) -> Choice:
     """Return the best set with each effect's posterior probability and its alternatives.
 
     The probability of an effect is the sum over the sets with it, or with a law that contains it.
+    Where noise explains every output, only a certain set is an answer.
     """
     ranked = beam.ranked()
     logs = np.array([beam.log(names) for names in ranked])
     weights = np.exp(logs - logs[0])
     weights /= weights.sum()
     best = beam.best if weights[0] > MOST else _determined(beam, ranked)
+    if weights[0] < CERTAIN and not beam.open_outputs(frozenset()):
+        best = frozenset()
     fitted = beam.fits[best]
     steps = []
     for effect in fitted.effects:

@@ -129,13 +129,18 @@ class Problem:
 
     def within_tolerance(self, found: Fit) -> Fit:
         """Return a fit with its nuisance parameters clipped to their 95 % intervals."""
-        values = dict(found.values)
+        values, penalty = dict(found.values), dict[str, float]()
         for key, prior in self.priors.items():
             if key in values:
                 half = NORMAL_95 * prior.sigma
                 values[key] = min(max(values[key], prior.mean - half), prior.mean + half)
+                penalty[key] = 0.5 * ((values[key] - prior.mean) / prior.sigma) ** 2
         rig = self.rig_of(found.effects, values)
-        return found if rig is None else replace(found, values=values, rig=rig)
+        groups = {
+            members: replace(group, penalty=sum(penalty.get(key, 0.0) for key in group.values))
+            for members, group in found.groups.items()
+        }
+        return found if rig is None else replace(found, values=values, rig=rig, groups=groups)
 
     def without_colour_allowance(self, root: Rig) -> Problem:
         """Return the problem without the allowance for noise colour (`Case`)."""

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
 from coupled.gap.diagnose import Diagnosis, diagnose
+from coupled.gap.effects.library import BY_NAME
+from coupled.gap.search.beam import _choose
 from coupled.rig.rig import Rig
 from tests.support.gaps import made, nominal_rig
 
@@ -70,6 +74,40 @@ def test_a_number_within_its_tolerance_is_no_effect_and_one_beyond_it_is(tmp_pat
     assert answer(tmp_path, {"inertia": {"factor": 1.01}}, 7).verdict == "no_gap"
     beyond = answer(tmp_path, {"inertia": {"factor": 1.15}}, 7)
     assert [effect.name for effect in beyond.effects] == ["inertia"]
+
+
+@pytest.mark.parametrize(
+    ("ahead", "left", "named"),
+    [(0.3, set(), False), (0.3, {"loader"}, True), (3.0, set(), True)],
+    ids=["a tie, and noise explains all", "a tie beside a gap", "certain"],
+)
+def test_where_noise_explains_every_stage_only_a_certain_set_is_named(
+    ahead: float, left: set[str], named: bool
+) -> None:
+    """An effect as likely as none was reported, at 0.57, beside stages that were all in noise."""
+    effect, none = BY_NAME["arc_geometry"], frozenset[str]()
+    logs = {none: 0.0, frozenset({effect.name}): ahead}
+    fits = {names: SimpleNamespace(effects=(effect,) if names else ()) for names in logs}
+    beam: Any = SimpleNamespace(
+        ranked=lambda: sorted(logs, key=lambda names: -logs[names]),
+        log=logs.__getitem__,
+        best=frozenset({effect.name}),
+        fits=fits,
+        known=logs,
+        without_effects=fits[none],
+        open_outputs=lambda names: left,
+    )
+    assert bool(_choose(beam, ()).steps) is named
+
+
+@pytest.mark.parametrize(("factor", "found"), [(1.015, []), (1.03, ["inertia"])])
+def test_the_tolerance_is_that_of_the_rig_file(
+    tmp_path: Path, factor: float, found: list[str]
+) -> None:
+    """A mass off by 3 % left a gap of many floors within 2 %, and was no gap by its prior."""
+    nominal = nominal_rig(False)
+    record = made(tmp_path, nominal, {"inertia": {"factor": factor}}, 7, noisier=0.2)
+    assert [effect.name for effect in diagnose(nominal, {"r": record}).effects] == found
 
 
 def test_what_no_record_separates_is_ambiguous(tmp_path: Path) -> None:
