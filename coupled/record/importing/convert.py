@@ -18,11 +18,11 @@ from coupled.record.importing.clock import Grid, on_frames
 from coupled.record.importing.heads import known_map
 from coupled.record.importing.judging import judge
 from coupled.record.importing.mapping import (
-    CHANNELS,
     Channel,
     LogMap,
     as_table,
     factor_of,
+    named_in,
     own_unit,
     read_map,
 )
@@ -69,9 +69,8 @@ def import_log(
     warnings = [*_notes(logs), *_clock_warnings(grid)]
     if map_file == files[0] and log_map.clock.start > 0.0:
         warnings.append("the first row is from before JSBSim's trim, and is left out")
-    names = [name for name in CHANNELS if name in log_map.channels]
     record, logged, filled = {}, {}, {}
-    for name in names:
+    for name in named_in(log_map):
         channel = log_map.channels[name]
         log = logs[log_of(name, log_map, logs, map_file)]
         own = grids[log.name]
@@ -87,7 +86,7 @@ def import_log(
             raise InputError(log.file, channel.source, "has fewer than two numbers in this span")
     judged = judge(record, logged, rig, main.file)
     record |= {name: np.full(grid.frames, value) for name, value in constants.items()}
-    names = [name for name in CHANNELS if name in record]
+    names = [name for name in named_in(whole_map) if name in record]
     channels = {
         name: ChannelAccount(
             source=log_map.channels[name].source,
@@ -125,7 +124,7 @@ def _constants(log_map: LogMap, map_file: Path) -> dict[str, float]:
     """Return the channels that no log holds, each in the unit that it ends in."""
     return {
         name: one.sign
-        * factor_of(name, one.unit or own_unit(name), map_file, one.radius)
+        * (1.0 if one.own else factor_of(name, one.unit or own_unit(name), map_file, one.radius))
         * (one.scale * one.value + one.offset)
         for name, one in log_map.channels.items()
         if one.value is not None
@@ -137,9 +136,10 @@ def _in_si(log: Log, name: str, channel: Channel, map_file: Path, warnings: list
     key = f"channels.{name}"
     values = log.values(channel, map_file, key)
     stated = log.units.get(channel.source, "")
-    if not channel.unit and not stated:
+    if not channel.own and not channel.unit and not stated:
         raise InputError(map_file, f"{key}.unit", "is missing; the log states none")
-    factor = factor_of(name, channel.unit or stated, map_file, channel.radius)
+    given = channel.unit or stated
+    factor = 1.0 if channel.own else factor_of(name, given, map_file, channel.radius)
     if channel.unit and stated and parse_unit(stated) != parse_unit(channel.unit):
         warnings.append(f"{name}: the map says {channel.unit}, the log itself {stated}")
     si = channel.sign * factor * (channel.scale * values + channel.offset)

@@ -16,7 +16,14 @@ from pydantic import BeforeValidator
 from pydantic_core import PydanticCustomError
 
 from coupled.errors import InputError, collected, nearest, together
-from coupled.record.channels import CONTROL_NAMES, LATERAL, LONGITUDINAL, TIME, control_channels
+from coupled.record.channels import (
+    CONTROL_NAMES,
+    LATERAL,
+    LONGITUDINAL,
+    TIME,
+    control_channels,
+    misnamed,
+)
 from coupled.schema import Section, build, file_keys, known_keys, load_toml, named, quantity
 from coupled.units import Unit, parse_unit, unit_names, units_like
 
@@ -26,6 +33,7 @@ CHANNELS: tuple[str, ...] = (
     *LATERAL,
 )
 LOAD_FACTOR = "load_factor"
+_OWN_NAME = re.compile("[A-Za-z][A-Za-z0-9_]{0,63}")
 
 
 class Layout(Section):
@@ -95,9 +103,13 @@ class OtherClock(Stamped):
 
 
 class Channel(Section):
-    """One channel of the record, from one column of a log, or of one `value` throughout."""
+    """One channel of the record, from one column of a log, or of one `value` throughout.
+
+    `own` is true for a channel of the user's own, as a temperature: it is kept without a unit.
+    """
 
     source: str = named("from", "")
+    own: bool = False
     value: float | None = None
     log: str = ""
     element: Annotated[int | str | None, BeforeValidator(_one_element)] = None
@@ -134,8 +146,8 @@ def read_map(path: Path) -> LogMap:
     made = {}
     for name, given in channels.items():
         with collected(faults):
-            _check_name(name, path)
             made[name] = build(Channel, given, path, f"channels.{name}")
+            _check_name(name, made[name], path)
     clocks, others = table.get("clocks", {}), {}
     if not isinstance(clocks, dict):
         problem = 'is a table for each further log, as [clocks."state.csv"]'
@@ -155,12 +167,29 @@ def read_map(path: Path) -> LogMap:
     return found
 
 
-def _check_name(name: str, path: Path) -> None:
+def _check_name(name: str, channel: Channel, path: Path) -> None:
+    key = f"channels.{name}"
     if name == TIME:
-        raise InputError(path, f"channels.{name}", "the time is given by [clock]")
-    if name not in CHANNELS:
-        hint = nearest(name, CHANNELS)
-        raise InputError(path, f"channels.{name}", f"no record has such a channel; {hint}")
+        raise InputError(path, key, "the time is given by [clock]")
+    if channel.own:
+        mistyped = (name, name) if name in CHANNELS else misnamed([name])
+        if mistyped is not None:
+            raise InputError(path, f"{key}.own", f"is not for {mistyped[1]}, a channel of records")
+        if not _OWN_NAME.fullmatch(name):
+            problem = "is no name: give letters, digits and underscores, as room_C"
+            raise InputError(path, key, problem)
+        if channel.unit or channel.radius is not None:
+            problem = "is not for a channel of your own: convert it by scale and offset"
+            raise InputError(path, f"{key}.{'unit' if channel.unit else 'radius_m'}", problem)
+    elif name not in CHANNELS:
+        problem = f"no record has such a channel; {nearest(name, CHANNELS)}"
+        raise InputError(path, key, f"{problem}; own = true for one of your own")
+
+
+def named_in(log_map: LogMap) -> list[str]:
+    """Return the channels of a map in the order of a record, the user's own last."""
+    own = [name for name, channel in log_map.channels.items() if channel.own]
+    return [*(name for name in CHANNELS if name in log_map.channels), *own]
 
 
 def _faults(found: LogMap, path: Path) -> list[InputError]:

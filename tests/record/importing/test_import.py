@@ -416,3 +416,44 @@ def test_an_evenly_sampled_log_needs_no_time_column(tmp_path: Path) -> None:
     record, account = imported(tmp_path, log_map=rate)
     np.testing.assert_allclose(record["column_force_N"], FORCE_N, rtol=1e-10)
     assert account.unmapped == ("T",)
+
+
+# Channels of the user's own
+
+
+def with_own(name: str, keys: str) -> tuple[str, str]:
+    """Return a log with a temperature, and a map that reads it under a name."""
+    head, *rows = text().splitlines()
+    log = [f"{head},Temp", *(f"{row},{20.0 + 0.001 * k}" for k, row in enumerate(rows))]
+    return "\n".join(log) + "\n", f'{MAP}[channels."{name}"]\nfrom = "Temp"\n{keys}'
+
+
+def test_a_channel_of_the_users_own_is_imported_for_a_regressor(tmp_path: Path) -> None:
+    log, log_map = with_own("motor_temperature_K", "own = true\noffset = 273.15\n")
+    (tmp_path / "log.csv").write_text(log)
+    (tmp_path / "map.toml").write_text(log_map)
+    record, account = import_log(tmp_path / "log.csv", tmp_path / "map.toml")
+    assert record.channels[-1] == "motor_temperature_K"
+    assert record["motor_temperature_K"][0] == pytest.approx(293.15)
+    assert record.manifest["channels"] == list(record.channels)
+    assert account.channels["motor_temperature_K"].source == "Temp"
+
+
+@pytest.mark.parametrize(
+    ("name", "keys", "says"),
+    [
+        ("motor_temperature_K", "", "no record has such a channel; .*own = true for one of your"),
+        ("motor_temperature_K", 'own = true\nunit = "m"\n', "convert it by scale and offset"),
+        ("column_forse_N", "own = true\n", "own: is not for column_force_N"),
+        ("column_force_lbf", "own = true\n", "own: is not for column_force_N"),
+        ("a b", "own = true\n", "is no name: give letters"),
+    ],
+)
+def test_another_channel_is_refused_by_its_key(
+    tmp_path: Path, name: str, keys: str, says: str
+) -> None:
+    log, log_map = with_own(name, keys)
+    (tmp_path / "log.csv").write_text(log)
+    (tmp_path / "map.toml").write_text(log_map)
+    with pytest.raises(InputError, match=says):
+        import_log(tmp_path / "log.csv", tmp_path / "map.toml")
