@@ -262,11 +262,13 @@ def _search_from(
 ) -> tuple[Beam, tuple[dict[str, float], ...]]:
     """Search the sets of a library's effects from known fits, the first without effects.
 
-    Return the beam, and the gains of each depth (`_search_by_depth`).
+    If an output is over its limit with the nuisance parameters within their tolerance, they stay
+    there without effects. Return the beam, and the gains of each depth (`_search_by_depth`).
     """
     without_effects, case = problem.within_tolerance(known[0]), problem.case
     beam = Beam(problem, without_effects, problem.model_error(without_effects.rig))
-    for fitted in (without_effects, *known[1:]):
+    over = beam.unexplained(stage_gaps(case.outputs, without_effects.rig))
+    for fitted in (without_effects if over else known[0], *known[1:]):
         beam.add(fitted)
     beam.recount()
     return beam, _search_by_depth(
