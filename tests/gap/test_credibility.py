@@ -139,8 +139,13 @@ def test_a_doubtful_small_effect_leaves_open_only_itself(
     assert verdict_of(choice, [stage], found, [budget]) == said
 
 
-@pytest.mark.parametrize(("zero", "said"), [(0.49, "ambiguous"), (0.2, "unexplained")])
-def test_alternatives_that_are_certain_together_hold_their_share(zero: float, said: str) -> None:
+@pytest.mark.parametrize(
+    ("zero", "rest", "said"),
+    [(0.49, 1.0, "ambiguous"), (0.2, 1.0, "unexplained"), (0.49, 3.0, "unexplained")],
+)
+def test_alternatives_that_are_certain_together_hold_their_share(
+    zero: float, rest: float, said: str
+) -> None:
     """A friction of 49 % and a zero, or a constant force, of 49 % closed a gap "unexplained"."""
     shares = {"friction": 0.49, "zero": 0.49, "breakout": 0.02}
     alone = {"friction": (), "zero": ("offset",), "breakout": ()}
@@ -149,7 +154,7 @@ def test_alternatives_that_are_certain_together_hold_their_share(zero: float, sa
         SimpleNamespace(effect=cast(Any, SimpleNamespace(name=n, stage="loader")), rivals=rivals)
         for n, rivals in alone.items()
     ]
-    stage = StageResult("loader", gap=16.0, settled=16.0, limit=BOUND, left=1.0, guilty=True)
+    stage = StageResult("loader", gap=16.0, settled=16.0, limit=BOUND, left=rest, guilty=True)
     budget: Any = SimpleNamespace(stage="loader", of=shares.__getitem__)
     found = [EffectResult(n, "loader", p, ()) for n, p in probabilities.items()]
     choice: Any = SimpleNamespace(steps=steps, probability=0.5)

@@ -40,9 +40,9 @@ def verdict_of(
 
     An effect without alternative that is not certain counts as unexplained, since it may imitate
     a fault outside the library. `mostly`: residual structure remains, but the certain effects hold
-    at least `MOST` of every faulty stage's gap, or of all gaps together. Two alternatives that are
-    certain together hold their share: only which of them is open. With alternatives the verdict is
-    `ambiguous` if no set of effects has more than half of the probability, or an effect that has
+    at least `MOST` of every faulty stage's gap, or of all gaps together. If no structure remains,
+    alternatives that are certain together hold their share as well. With alternatives the verdict
+    is `ambiguous` if no set of effects has more than half of the probability, or an effect that has
     them is not certain; but not if none of them is credible and the certain effects hold that
     share.
     """
@@ -50,13 +50,12 @@ def verdict_of(
     blamed = {step.effect.stage for step in choice.steps}
     sure = {effect.name for effect in effects if effect.probability >= CERTAIN}
     open_ones = doubted(choice, effects)
-    left = bool(open_ones) or any(
-        s.guilty and (s.name not in blamed or s.unexplained) for s in stages
-    )
+    remains = any(s.guilty and (s.name not in blamed or s.unexplained) for s in stages)
+    left = bool(open_ones) or remains
     known = {one.stage: one for one in budget}
-    some = one_is_certain(choice, effects)
-    held = all(_held(known.get(name), some) >= MOST for name in faulty)
-    if left and not held and (open_ones or _held_together(stages, known, some) < MOST):
+    holding = sure if remains else one_is_certain(choice, effects)
+    held = all(_held(known.get(name), holding) >= MOST for name in faulty)
+    if left and not held and (open_ones or _held_together(stages, known, sure) < MOST):
         return "unexplained"
     if not choice.steps:
         # A stage within a large noise floor may hide a gap.

@@ -36,7 +36,6 @@ from coupled.gap.thresholds import (
     BEAM_CANDIDATES,
     BEAM_DEPTH,
     BEAM_WIDTH,
-    CERTAIN,
     GIVEN_UP,
     MINOR,
     MORE,
@@ -639,14 +638,14 @@ def _choose(beam: Beam, rounds: tuple[dict[str, float], ...]) -> Choice:
     """Return the best set with each effect's posterior probability and its alternatives.
 
     The probability of an effect is the sum over the sets with it, or with a law that contains it.
-    Where noise explains every output, only a certain set is an answer.
+    Where noise explains every output, no effect is an alternative, and the answer if it is one.
     """
     ranked = beam.ranked()
     logs = np.array([beam.log(names) for names in ranked])
     weights = np.exp(logs - logs[0])
     weights /= weights.sum()
     best = beam.best if weights[0] > MOST else _determined(beam, ranked)
-    if weights[0] < CERTAIN and not beam.open_outputs(frozenset()):
+    if beam.log(frozenset()) > logs[0] - RIVAL_GAIN and not beam.open_outputs(frozenset()):
         best = frozenset()
     fitted = beam.fits[best]
     steps = []

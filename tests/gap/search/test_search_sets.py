@@ -78,10 +78,10 @@ def test_a_number_within_its_tolerance_is_no_effect_and_one_beyond_it_is(tmp_pat
 
 @pytest.mark.parametrize(
     ("ahead", "left", "named"),
-    [(0.3, set(), False), (0.3, {"loader"}, True), (3.0, set(), True)],
-    ids=["a tie, and noise explains all", "a tie beside a gap", "certain"],
+    [(0.3, set(), False), (3.0, set(), False), (0.3, {"loader"}, True), (5.0, set(), True)],
+    ids=["as likely as none", "somewhat likelier", "as likely, beside a gap", "none excluded"],
 )
-def test_where_noise_explains_every_stage_only_a_certain_set_is_named(
+def test_where_noise_explains_every_stage_an_effect_is_named_if_none_is_excluded(
     ahead: float, left: set[str], named: bool
 ) -> None:
     """An effect as likely as none was reported, at 0.57, beside stages that were all in noise."""
