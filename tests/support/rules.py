@@ -122,7 +122,7 @@ RULES = (
     Rule("determined", "search.beam:_determined", lambda original, beam, ranked: ranked[0],
          "of alternatives below half, the first whose sizes are determined is reported"),
     Rule("noise_explains", "search.beam:Beam.open_outputs", gives({""}),
-         "where noise explains all, no effect is the answer unless odds of 55 exclude it", "_choose"),
+         "where noise explains all, no effect is the answer unless it is excluded", "_choose"),
     Rule("own_trim", "search.fit:_with_trim", gives(None),
          "a fit also starts from parameters that have the record's trim", fresh=True),
     Rule("named_contact", "search.beam:_name_law_with_contact", second,
