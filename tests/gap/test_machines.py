@@ -92,7 +92,7 @@ def test_noise_that_may_be_coloured_lets_no_one_say_that_there_is_no_gap(
     assert (found.verdict, found.effects) == (verdict, ())
     if verdict == "ambiguous":
         assert "may be coloured noise of its input" in found.summary
-        assert found.next_test.startswith("Record an input that changes more slowly")
+        assert found.next_test.startswith("Record an input that changes less often")
         assert found.stage("loader").as_dict()["judged"] is False
 
 

@@ -678,7 +678,7 @@ def _choose(beam: Beam, rounds: tuple[dict[str, float], ...]) -> Choice:
 
 
 def _determined(beam: Beam, ranked: Sequence[Names]) -> Names:
-    """Return the first of several alternatives whose sizes are determined; of none, the first."""
+    """Return the first set near the best whose sizes are determined; if there is none, the best."""
     near = [names for names in ranked if beam.log(names) > beam.log(ranked[0]) - RIVAL_GAIN]
     sure = (names for names in near if names and is_admissible(beam.problem, beam.fits[names]))
     return next(sure, ranked[0])

@@ -99,7 +99,9 @@ class HiddenGap:
         if self.misses:
             return "Fit the rig to the healthy record first (coupled fit), then diagnose again."
         if self.coloured:
-            return "Record an input that changes more slowly or more rarely: that shows its noise."
+            return (
+                "Record an input that changes less often: its noise is estimated between changes."
+            )
         if self.still:
             return f"Record a force that moves {self.channel}, or {self.noisiest} with less noise."
         larger = f"{math.ceil(self.share / SMALL)} times as large"
@@ -235,7 +237,7 @@ class Output:
 
     @property
     def sure_limit(self) -> float:
-        """The same if the colour of the input's noise is as estimated."""
+        """The largest gap of noise alone if the input's noise has the estimated spectrum."""
         return max(FAULTY_FROM, self._largest, 1.0 + self.mismatch)
 
     @property

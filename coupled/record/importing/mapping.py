@@ -19,8 +19,10 @@ from coupled.errors import InputError, collected, nearest, together
 from coupled.record.channels import (
     CONTROL_NAMES,
     LATERAL,
+    LOADER_TIME,
     LONGITUDINAL,
     TIME,
+    VALIDITY,
     control_channels,
     misnamed,
 )
@@ -172,7 +174,8 @@ def _check_name(name: str, channel: Channel, path: Path) -> None:
     if name == TIME:
         raise InputError(path, key, "the time is given by [clock]")
     if channel.own:
-        mistyped = (name, name) if name in CHANNELS else misnamed([name])
+        known = name in (*CHANNELS, LOADER_TIME, VALIDITY)
+        mistyped = (name, name) if known else misnamed([name])
         if mistyped is not None:
             raise InputError(path, f"{key}.own", f"is not for {mistyped[1]}, a channel of records")
         if not _OWN_NAME.fullmatch(name):

@@ -446,6 +446,7 @@ def test_a_channel_of_the_users_own_is_imported_for_a_regressor(tmp_path: Path) 
         ("motor_temperature_K", 'own = true\nunit = "m"\n', "convert it by scale and offset"),
         ("column_forse_N", "own = true\n", "own: is not for column_force_N"),
         ("column_force_lbf", "own = true\n", "own: is not for column_force_N"),
+        ("loader_time_s", "own = true\n", "own: is not for loader_time_s"),
         ("a b", "own = true\n", "is no name: give letters"),
     ],
 )
