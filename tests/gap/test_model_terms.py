@@ -253,6 +253,19 @@ def test_the_whole_diagnosis_names_it_alone_and_its_rig_closes_the_gap(
 
 
 @pytest.mark.slow
+def test_the_drift_after_a_restart_is_not_taken_for_more_wrong_functions(tmp_path: Path) -> None:
+    """A wrong lift of a T-37's elevator explains all; thrust and damping would take the drift."""
+    rig = read_rig(shipped_rigs()["t37"])
+    record = motion_of(flown(tmp_path, rig, "aero/coefficient/CLde", 0.8))
+    found = diagnose(rig, {"r": record}, terms=True)
+    (effect,) = found.effects
+    (factor,) = effect.parameters
+    assert (found.verdict, effect.of) == ("effect", "aero/coefficient/CLde")
+    assert factor.low is not None and factor.high is not None
+    assert factor.low < 0.8 < factor.high
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [effect.name for effect in AIRFRAME if "gust" not in effect.name])
 def test_each_factor_is_named_at_its_size(cessna: Rig, name: str) -> None:
     """By surfaces and motion alone, within 3 standard errors: 14 sizes are tested.

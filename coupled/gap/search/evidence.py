@@ -24,11 +24,12 @@ size is uniform in its logarithm over Λ = ln 10⁴, so s = |θ̂ − θ₀|·Λ
 θ₀; the size is taken as at least its standard error. The evidence is then independent of the unit.
 The prior of a nuisance parameter is Gaussian, or uniform between its bounds.
 
-τ_n is the integrated autocorrelation time (`memory`) of the smallest residual of output o in any
-set. It is the same for all sets, so that the longer correlation of a worse residual does not reduce
-its weight. τ_g is that of the residual without effects: the model error is a share of it, and is as
-smooth. A difference of two sets that is smaller than the model error is then little evidence,
-however long the record.
+τ_n is the integrated autocorrelation time of the smallest residual of output o in any set, and at
+least that of the noise floor, where samples of its error are known (`Output.samples`). It is the
+same for all sets, so that the longer correlation of a worse residual does not reduce its weight.
+τ_g is that of the residual without effects: the model error is a share of it, and is as smooth. A
+difference of two sets that is smaller than the model error is then little evidence, however long
+the record.
 
 MacKay, Information Theory, Inference, and Learning Algorithms (2003), ch. 28, has the theory.
 """
@@ -44,7 +45,7 @@ import numpy as np
 from coupled.gap.effects.effect import Effect, Parameter
 from coupled.gap.search.found import Fit, Group
 from coupled.gap.search.problem import ModelError, Problem
-from coupled.gap.signals.output import Floats, Output, memory
+from coupled.gap.signals.output import Floats, Output
 from coupled.gap.thresholds import NORMAL_95, PRIOR_EFFECT, PRIOR_NUMBER, PRIOR_SPAN
 from coupled.rig.rig import Rig
 
@@ -97,7 +98,7 @@ def evidence_of(problem: Problem, rig: Rig, error: ModelError, rest: float) -> E
     squares = np.array([float(np.mean(left**2)) for left in lefts]) / error.variance
     if problem.case.model_error_in_floors:
         squares = np.maximum(squares, 1.0)
-    samples = np.array([len(left) / memory(left) for left in lefts])
+    samples = np.array([o.samples(left) for o, left in zip(problem.outputs, lefts, strict=True)])
     return Evidence(squares, samples, rest, error)
 
 
@@ -142,5 +143,5 @@ def likelier_by(outputs: Sequence[Output], right: Fit, wrong: Fit) -> float:
     for output in outputs:
         lefts = output.residual(right.rig), output.residual(wrong.rig)
         better, worse = misfit(np.array([float(np.mean(left**2)) for left in lefts]))
-        gain += 0.5 * len(lefts[0]) / memory(lefts[0]) * float(worse - better)
+        gain += 0.5 * output.samples(lefts[0]) * float(worse - better)
     return gain

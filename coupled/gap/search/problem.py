@@ -16,7 +16,7 @@ from coupled.gap.search.case import Case
 from coupled.gap.search.descent import WHOLE, Descent
 from coupled.gap.search.fit import fit_set
 from coupled.gap.search.found import Fit
-from coupled.gap.signals.output import Floats, Output, Part, memory, stage_gaps, stage_limits
+from coupled.gap.signals.output import Floats, Output, Part, stage_gaps, stage_limits
 from coupled.gap.thresholds import MISMATCH, NORMAL_95
 from coupled.rig.rig import Rig
 
@@ -166,8 +166,7 @@ class Problem:
         """
         gaps = np.array([output.gap(without) for output in self.outputs])
         share = np.array([0.0 if one.stage in EXACT else MISMATCH for one in self.outputs])
-        lefts = [output.residual(without) for output in self.outputs]
-        samples = np.array([len(left) / memory(left) for left in lefts])
+        samples = np.array([output.samples(output.residual(without)) for output in self.outputs])
         return ModelError((share * np.maximum(gaps - 1.0, 0.0)) ** 2, samples)
 
 

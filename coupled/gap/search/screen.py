@@ -32,7 +32,7 @@ from coupled.gap.effects.effect import Effect, touched
 from coupled.gap.search.evidence import misfit
 from coupled.gap.search.found import Fit
 from coupled.gap.search.problem import ModelError, Problem
-from coupled.gap.signals.output import Floats, memory
+from coupled.gap.signals.output import Floats
 from coupled.gap.thresholds import (
     BEAM_CANDIDATES,
     BEAM_FACTORS,
@@ -176,7 +176,8 @@ class Screen:
     def _samples(self, ours: Sequence[int], left: Floats) -> Floats:
         """Return the effective samples of some outputs' residuals."""
         parts = np.split(left, self._edges(ours)[1:])
-        return np.array([len(part) / memory(part) for part in parts])
+        outputs = [self.problem.outputs[k] for k in ours]
+        return np.array([one.samples(part) for one, part in zip(outputs, parts, strict=True)])
 
     def _gain(self, ours: Sequence[int], before: Floats, after: Floats, samples: Floats) -> float:
         """Return the increase of the log-likelihood of some outputs from one residual to another.

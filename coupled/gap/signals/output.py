@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
@@ -257,6 +258,22 @@ class Output:
         return float(
             np.std(self.measured if self.handed_on is None else self.measured - self.handed_on)
         )
+
+    @cached_property
+    def _memory(self) -> float:
+        """The autocorrelation time of the floor as far as samples of its error show it, frames."""
+        if not self.errors:
+            return 1.0
+        power = min(float(np.mean(np.square(self.errors))) / self.floor**2, 1.0)
+        return 1.0 + power * (float(np.mean([memory(error) for error in self.errors])) - 1.0)
+
+    def samples(self, left: Floats) -> float:
+        """Return the effective samples of a residual: its frames over its autocorrelation time.
+
+        That time is at least the one of the noise floor: a small part of it, such as the drift
+        after a wrong restart, may last long, and a set of effects may take it off.
+        """
+        return len(left) / max(memory(left), self._memory)
 
     def gap(self, rig: Rig) -> float:
         """Return the rms residual over the floor."""

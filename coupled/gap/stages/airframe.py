@@ -63,10 +63,22 @@ _KEPT = 128  # size of the cache of flights: most of a search; 0.4 MB each in a 
 
 
 class Flights:
-    """A cache of a record's last flights, by aircraft, surface motion and motion of the air."""
+    """A cache of a record's last flights, by aircraft, surface motion and motion of the air.
+
+    It also keeps what measuring errors change in a flight: as in the aircraft that was first flown
+    in air of the same gusts, of which another aircraft's changes differ by little.
+    """
 
     def __init__(self) -> None:
         self._known: list[tuple[tuple[Any, ...], Flown | None]] = []
+        self._errors: dict[tuple[Any, ...], list[Floats]] = {}
+
+    def errors(self, what: str, flight: Flight, fly: Callable[[], list[Floats]]) -> list[Floats]:
+        """Return the changes of a flight by errors from the cache, or new ones."""
+        asked = what, flight.gust_rms, flight.lateral_gust_rms
+        if asked not in self._errors:
+            self._errors[asked] = fly()
+        return self._errors[asked]
 
     def of(self, asked: tuple[Any, ...], fly: Callable[[], Flown]) -> Flown | None:
         """Return a flight from the cache or a new one; None if the aircraft cannot be trimmed."""
@@ -186,14 +198,12 @@ class Model:
         ]
         return [one.motion[:, 1:] - plain for one in flown]
 
-    def carried(self, wrong: Sequence[Moved], plain: Flown) -> Floats:
-        """Return the change of the flight by errors of the surfaces' motion and of the air."""
+    def carried(self, wrong: Sequence[Sequence[Moved]], plain: Floats) -> list[Floats]:
+        """Return the changes of the flight by errors of the surfaces' motion and of the air."""
         assert self.rig.flight is not None
         flight = changed(self.rig.flight, {"motion_stamp_s": 0.0}, self.rig.name, "flight")
-        asked = (flight, self.compared, _digest(wrong), "with error")
-        flown = self.flights.of(asked, lambda: self.fly(flight, wrong, with_error=True))
-        assert flown is not None  # as without
-        return flown.motion - plain.motion
+        flown = [self.fly(flight, one, with_error=True) for one in wrong]
+        return [one.motion - plain for one in flown]
 
     def fly(
         self,
@@ -299,7 +309,7 @@ def airframe_outputs(
     model = Model(rig, record, right, compared, known, Restarts.of(record, rig.frame_rate))
     flown = model.flown(rig)
     assert flown is not None  # the filed rig can be trimmed
-    carried = [model.carried(one, flown) for one in wrong]
+    carried = known.errors("open loop", rig.flight, lambda: model.carried(wrong, flown.motion))
     unknown = model.unknown_between(flown.motion)
     outputs = []
     for i, name in enumerate(compared):
@@ -334,7 +344,10 @@ def _slow_outputs(model: Model, wrong: Sequence[Sequence[Moved]], number: int) -
     record, rate_Hz = model.record, model.rig.frame_rate
     shots = model.shots(model.rig)
     assert shots is not None  # the filed rig can be trimmed
-    carried, restarted = model.wrong_shots(wrong, shots), model.restarted()
+    flight = model.rig.flight
+    assert flight is not None
+    carried = model.flights.errors("shots", flight, lambda: model.wrong_shots(wrong, shots))
+    (restarted,) = model.flights.errors("restarts", flight, lambda: [model.restarted()])
     outputs = []
     for i, name in enumerate(SLOW):
         noise = left_noise(estimate_noise(record[name]), record[name], record[name] - shots[:, i])

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from coupled.gap.effects.library import BY_NAME
 from coupled.gap.search.case import Case
@@ -95,6 +96,21 @@ def test_samples_are_counted_by_the_set_that_leaves_least_of_each_output() -> No
     first = Evidence(np.array([4.0, 1.0]), np.array([10.0, 500.0]), 0.0, NO_ERROR)
     second = Evidence(np.array([1.0, 9.0]), np.array([400.0, 20.0]), 0.0, NO_ERROR)
     assert fewest_unexplained([first, second]) == pytest.approx([400.0, 500.0])
+
+
+def test_a_slow_part_of_the_noise_counts_even_where_a_set_took_it_off() -> None:
+    """The autocorrelation time of a mixture is the mean of its parts' times by their power."""
+    kept, power, rng = 0.98, 0.06, np.random.default_rng(4)
+    shocks = np.sqrt(power * (1.0 - kept**2)) * rng.standard_normal((3, FRAMES))
+    slow = [lfilter([1.0], [1.0, -kept], one) for one in shocks]
+    (plain,) = problem(0.0).outputs
+    white = rng.standard_normal(FRAMES)
+    assert plain.samples(white) > 0.9 * FRAMES
+    known = replace(plain, floor=1.0, errors=slow)
+    wanted = FRAMES / (1.0 + power * ((1.0 + kept) / (1.0 - kept) - 1.0))
+    assert known.samples(white) == pytest.approx(wanted, rel=0.25)
+    longer = lfilter([1.0], [1.0, -0.999], white)
+    assert known.samples(longer) == plain.samples(longer)
 
 
 def test_a_fit_of_the_same_set_begins_at_the_given_start() -> None:
