@@ -45,6 +45,7 @@ from coupled.gap.thresholds import (
     SCREEN_LESS,
     SCREEN_NEAR,
     SERVO_SHARES,
+    SMALL,
     TINY,
 )
 from coupled.parallel import go_on, in_threads
@@ -254,15 +255,22 @@ class Screen:
         return Screened(effect, found, taken, gain, direction, refitted)
 
     def _signatures(self, current: Fit, effect: Effect) -> list[_Signature]:
-        """Return an effect's signatures with the current effects."""
+        """Return an effect's signatures with the current effects.
+
+        That of an effect of the airframe is its slope, from a small step: between trims further
+        apart, what the trim has left of the accelerations jumps.
+        """
         now = _residual(self.problem, effect, current.rig)
+        part = SMALL if STAGE_OF[effect.stage].flown and effect.seen is None else 1.0
         found = []
         for shape, tries in enumerate(_tries(self.problem, current, effect)):
             for values in tries:
                 go_on()
-                rig = _with(self.problem, current, effect, values)
+                rig = _with(
+                    self.problem, current, effect, _step(self.problem, effect, values, part)
+                )
                 if rig is not None:
-                    change = _residual(self.problem, effect, rig) - now
+                    change = (_residual(self.problem, effect, rig) - now) / part
                     found.append(_Signature(values, shape, change))
         return found
 
@@ -286,6 +294,16 @@ def _residual(problem: Problem, effect: Effect, rig: Rig) -> Floats:
 def _with(problem: Problem, current: Fit, effect: Effect, values: Values) -> Rig | None:
     """Return the current rig with one more effect; None if it is no valid rig."""
     return problem.rig_of((*current.effects, effect), {**current.values, **values})
+
+
+def _step(problem: Problem, effect: Effect, values: Values, part: float) -> Values:
+    """Return values whose sizes are a part of the given ones."""
+    case, found = problem.case, dict(values)
+    for p in effect.free if part != 1.0 else ():
+        if p.is_size:
+            key, none = effect.value_key(p), p.neutral(case.nominal, case.control)
+            found[key] = none + part * (values[key] - none)
+    return found
 
 
 def _tries(problem: Problem, current: Fit, effect: Effect) -> list[list[Values]]:

@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
@@ -130,6 +129,7 @@ class Output:
     shots      prediction by multiple shooting: short replays, restarted as measured
     handed_on  part of the measurement that comes from the input; the rest is the stage's own motion
     errors     samples of the propagated error of the input; of one number in all of a record's
+    lasts      autocorrelation time of the noise floor, frames
     """
 
     stage: str
@@ -152,6 +152,7 @@ class Output:
     shots: Predict | None = field(default=None, repr=False, compare=False)
     handed_on: Floats | None = field(default=None, repr=False, compare=False)
     errors: Sequence[Floats] = field(default=(), repr=False, compare=False)
+    lasts: float = 1.0
     _known: list[tuple[Any, Floats]] = field(default_factory=list, repr=False, compare=False)
 
     def allows_coarse_steps(self, rig: Rig) -> bool:
@@ -259,21 +260,13 @@ class Output:
             np.std(self.measured if self.handed_on is None else self.measured - self.handed_on)
         )
 
-    @cached_property
-    def _memory(self) -> float:
-        """The autocorrelation time of the floor as far as samples of its error show it, frames."""
-        if not self.errors:
-            return 1.0
-        power = min(float(np.mean(np.square(self.errors))) / self.floor**2, 1.0)
-        return 1.0 + power * (float(np.mean([memory(error) for error in self.errors])) - 1.0)
-
     def samples(self, left: Floats) -> float:
         """Return the effective samples of a residual: its frames over its autocorrelation time.
 
         That time is at least the one of the noise floor: a small part of it, such as the drift
         after a wrong restart, may last long, and a set of effects may take it off.
         """
-        return len(left) / max(memory(left), self._memory)
+        return len(left) / max(memory(left), self.lasts)
 
     def gap(self, rig: Rig) -> float:
         """Return the rms residual over the floor."""
@@ -339,6 +332,12 @@ def spread(
     mean, square_mean = np.average([local, local**2], axis=1, weights=lengths)
     crowd = float(mean**2 / square_mean) if total > 0.0 else 1.0
     return float(np.sqrt(0.5 * square / total**2 / (crowd * len(carried[0]))))
+
+
+def lasting(errors: Sequence[Floats], floor: float) -> float:
+    """Return the autocorrelation time, frames, of a noise floor that includes some errors."""
+    power = min(float(np.mean(np.square(errors))) / floor**2, 1.0)
+    return 1.0 + power * (float(np.mean([memory(error) for error in errors])) - 1.0)
 
 
 def memory(residual: Floats) -> float:

@@ -27,7 +27,7 @@ from coupled.flight.gusts import DRAWN, GivenAir
 from coupled.gap.noise.smooth import smoothed
 from coupled.gap.signals.air import NEEDS_ACROSS, Air, crossing_air, vertical_air
 from coupled.gap.signals.floors import left_noise
-from coupled.gap.signals.output import TRIM, Output, estimate_noise, spread, white
+from coupled.gap.signals.output import TRIM, Output, estimate_noise, lasting, spread, white
 from coupled.gap.stages.openloop import Between, Flown, Moved, flown_in, fly_open_loop
 from coupled.gap.stages.shots import SLOW, Restarts, States, is_throttled
 from coupled.gap.stages.surfaces import (
@@ -331,7 +331,8 @@ def airframe_outputs(
             return stamped(np.asarray(made.motion[:, i]), late)
 
         given = (record[name], predict, floor, rig.frame_rate, number, loose, moved_by / floor)
-        outputs.append(Output("airframe", name, *given, errors=errors))
+        lasts = lasting(errors, floor)
+        outputs.append(Output("airframe", name, *given, errors=errors, lasts=lasts))
     if model.restarts is not None and not is_throttled(record):
         outputs += _slow_outputs(model, wrong, number)
     if "column" in trims:
@@ -366,7 +367,8 @@ def _slow_outputs(model: Model, wrong: Sequence[Sequence[Moved]], number: int) -
             return stamped(np.asarray(made[:, i]), other.flight.motion_stamp * rate_Hz)
 
         given = (record[name], predict, floor, rate_Hz, number, loose, moved_by / floor)
-        outputs.append(Output("airframe", name, *given, errors=errors))
+        lasts = lasting(errors, floor)
+        outputs.append(Output("airframe", name, *given, errors=errors, lasts=lasts))
     return outputs
 
 

@@ -15,7 +15,7 @@ from coupled.gap.search.case import Case
 from coupled.gap.search.descent import Descent
 from coupled.gap.search.evidence import Evidence, evidence, fewest_unexplained, log_prior, misfit
 from coupled.gap.search.problem import ModelError, Problem
-from coupled.gap.signals.output import Output
+from coupled.gap.signals.output import Output, lasting
 from coupled.gap.thresholds import PRIOR_SPAN
 from coupled.rig.rig import Rig
 from tests.support.rigs import bench
@@ -106,7 +106,7 @@ def test_a_slow_part_of_the_noise_counts_even_where_a_set_took_it_off() -> None:
     (plain,) = problem(0.0).outputs
     white = rng.standard_normal(FRAMES)
     assert plain.samples(white) > 0.9 * FRAMES
-    known = replace(plain, floor=1.0, errors=slow)
+    known = replace(plain, lasts=lasting(slow, 1.0))
     wanted = FRAMES / (1.0 + power * ((1.0 + kept) / (1.0 - kept) - 1.0))
     assert known.samples(white) == pytest.approx(wanted, rel=0.25)
     longer = lfilter([1.0], [1.0, -0.999], white)
