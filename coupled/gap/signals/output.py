@@ -129,7 +129,7 @@ class Output:
     shots      prediction by multiple shooting: short replays, restarted as measured
     handed_on  part of the measurement that comes from the input; the rest is the stage's own motion
     errors     samples of the propagated error of the input; of one number in all of a record's
-    lasts      autocorrelation time of the noise floor, frames
+    lasts      autocorrelation time of the noise floor, frames, if its residual may not show it
     """
 
     stage: str

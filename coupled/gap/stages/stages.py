@@ -37,15 +37,7 @@ from coupled.gap.signals.floors import (
     with_error,
 )
 from coupled.gap.signals.live import Mask
-from coupled.gap.signals.output import (
-    Floats,
-    HiddenGap,
-    Output,
-    Predict,
-    estimate_noise,
-    lasting,
-    spread,
-)
+from coupled.gap.signals.output import Floats, HiddenGap, Output, Predict, estimate_noise, spread
 from coupled.gap.signals.reading import Reading, drifts
 from coupled.gap.stages.host import Product, compensated
 from coupled.gap.stages.inputs import (
@@ -169,7 +161,6 @@ class Reader(Reading):
             made,
             spread=spread(tries, own.rms, own.memory, self.rig.frame_rate),
             smoothed=carried / floor,
-            lasts=lasting(tries, floor),
         )
         if not driven_by.quantity:
             return made
