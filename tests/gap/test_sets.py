@@ -159,22 +159,6 @@ def test_what_gained_is_listed_where_nothing_else_did(beside: bool) -> None:
     assert (name in beam.valid()) is not beside
 
 
-def test_two_slow_effects_are_found_together() -> None:
-    """Alone each leaves the other's slow wave, which is worth few effective samples."""
-    turns = 2.0 * np.pi * np.arange(FRAMES) / FRAMES
-    first, second = np.sin(2.0 * turns), np.sin(3.0 * turns)
-
-    def predict(rig: Rig) -> Floats:
-        loader = rig.controls["column"].loader
-        return np.asarray(loader.offset * first + loader.bob_weight * second)
-
-    measured = 12.0 * first + 12.0 * second + NOISE
-    choice = found([output(measured, predict)], [OFFSET, WEIGHT])
-    assert names(choice) == {"force_offset", "bob_weight"}
-    values = [choice.fit.values[one.value_key(one.free[0])] for one in (OFFSET, WEIGHT)]
-    assert values == pytest.approx([12.0, 12.0], rel=0.02)
-
-
 @pytest.mark.parametrize("first", [FIRST, np.sin(np.arange(FRAMES) / 9.0)])
 def test_an_effect_that_spoils_another_stage_is_not_named(first: Floats) -> None:
     """The zero of the gauge fits the loader as well, but the linkage refutes it."""

@@ -39,11 +39,6 @@ def second(original: Original, first: Any, argument: Any, *args: Any, **options:
     return argument
 
 
-def third(original: Original, first: Any, other: Any, argument: Any, *args: Any) -> Any:
-    """Take the place of a method that selects of its second argument: return it whole."""
-    return argument
-
-
 def idle(original: Original, *args: Any, **options: Any) -> None:
     """Take the place of a rule that only adds fits to a beam."""
 
@@ -51,11 +46,6 @@ def idle(original: Original, *args: Any, **options: Any) -> None:
 def without_relief(original: Original, beam: Any, fitted: Fit, share: float = 1.0) -> Worth:
     """Return the worth of a candidate, without the penalty that it may remove."""
     return Worth(PRIOR_EFFECT + share * beam.behind(fitted), beam.counts)
-
-
-def first_only(original: Original, *args: Any, **options: Any) -> Any:
-    """Return the first of the starts that a rule returns."""
-    return original(*args, **options)[:1]
 
 
 @dataclass(frozen=True)
@@ -92,33 +82,26 @@ class Rule:
 RULES = (
     Rule("needed", "search.beam:Beam._needed", gives(frozenset()),
          "an effect whose interval includes neutral is kept if all simpler sets lose by 5"),
+    Rule("contact_once", "search.beam:_contact_values", gives({}),
+         "laws of friction start from presliding parameters fitted before"),
     Rule("last_swaps", "search.beam:_sets_with_swap", gives([]),
          "swaps in the best set, at the end", "_fit_neighbours_of_best"),
     Rule("two_for_one", "search.beam:_fit_with_simpler_law", gives(None),
          "two effects of fewer parameters in place of a law of several"),
     Rule("restarts", "search.beam:_restart_simple_sets", idle,
          "restarts of simpler sets with friction, at the end"),
-    Rule("pairs", "search.screen:Screen.pair", gives(None),
-         "two effects added at once where no single one is worth a fit"),
     Rule("discrete", "search.beam:_fit_sets", gives([]),
          "discrete effects are fitted without screening", "_search_by_depth"),
     Rule("relief", "search.beam:Beam.worth", without_relief,
          "screening deducts the nuisance parameters' penalty"),
     Rule("strained", "search.beam:relief_of", gives(0.0),
          "a set is explained only within the nuisance parameters' tolerance", "open_outputs"),
-    Rule("best_first", "search.screen:Screen.still_worth", third,
-         "once the most promising candidate is fitted, others must still be worth a fit"),
     Rule("smooth_error", "search.problem:ModelError.smooth",
          lambda original, error, noise: np.ones_like(noise),
          "the model error is as smooth as the gap of which it is a share", fresh=True),
     Rule("tolerance", "search.problem:Problem.within_tolerance", second,
          "effects are screened with nuisance parameters within their tolerance",
          "_fit_neighbours"),
-    Rule("new_contact", "search.case:Case.but_for_contact",
-         lambda original, case, values: dict(values),
-         "the best set is fitted again from a new presliding grid"),
-    Rule("contact_once", "search.beam:_contact_values", gives({}),
-         "laws of friction start from presliding parameters fitted before"),
     Rule("determined", "search.beam:_determined", lambda original, beam, ranked: ranked[0],
          "of alternatives below half, the first whose sizes are determined is reported"),
     Rule("noise_explains", "search.beam:Beam.open_outputs", gives({""}),
@@ -132,8 +115,6 @@ RULES = (
          "presliding parameters start from a grid search", fresh=True),
     Rule("shooting", "search.beam:_fit_by_multiple_shooting", idle,
          "friction is also started from multiple shooting"),
-    Rule("higher_breakaway", "search.beam:_starts_with_other_law", first_only,
-         "a wider friction law is also started with a breakaway half as high again"),
     Rule("colour", "search.problem:Problem.without_colour_allowance", same,
          "a stage with a gap loses the allowance for unknown noise colour"),
     Rule("sensor_stamps", "search.case:Case._driven_over_limit", gives(()),

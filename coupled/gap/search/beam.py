@@ -18,7 +18,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,7 +37,6 @@ from coupled.gap.thresholds import (
     BEAM_WIDTH,
     GIVEN_UP,
     MINOR,
-    MORE,
     MOST,
     PRIOR_EFFECT,
     RIVAL_GAIN,
@@ -387,11 +385,10 @@ def _fit_with_simpler_law(beam: Beam, law: Effect) -> Fit | None:
 def _fit_neighbours(beam: Beam, fitted: Fit, library: Sequence[Effect], wanted: set[str]) -> None:
     """Fit the neighbours of a fitted set, with effects that show in the `wanted` outputs.
 
-    The candidate of the largest predicted gain is fitted first, and the others only if they may do
-    better. A law that contains another law is fitted after it, from its optimum, if the best set
-    leaves an output unexplained. Laws of dry friction start from presliding parameters that were
-    fitted before. Effects are screened with the nuisance parameters within their tolerance: beyond
-    it they may have absorbed an effect.
+    A law that contains another law is fitted after it, from its optimum, if the best set leaves an
+    output unexplained. Laws of dry friction start from presliding parameters that were fitted
+    before. Effects are screened with the nuisance parameters within their tolerance: beyond it they
+    may have absorbed an effect.
     """
     is_best, found, worth = names_of(fitted.effects) == beam.best, fitted, beam.worth(fitted)
     fitted, beside = (
@@ -400,19 +397,14 @@ def _fit_neighbours(beam: Beam, fitted: Fit, library: Sequence[Effect], wanted: 
     )
     many = BEAM_CANDIDATES if is_best else TRIES
     screened = beam.screen.best(fitted, beside, worth, many, anew=is_best)
-    if not screened and is_best and (pair := beam.screen.pair(fitted, beside, worth)):
-        _fit_sets(beam, _starts_with_two_more(fitted, *pair))
     effects = [one.effect for one in screened]
     plain = [one for one in screened if not any(contains(one.effect, e) for e in effects)]
-    ends = list[Fit]()
-    for some in (plain[:1], plain[1:]):
-        still = beam.screen.still_worth(fitted, some, beam.worth(found, MOST))
-        dry = next((one for one in still if one.effect.dry), None)
-        if dry is not None and not beam.contact:
-            first = _fit_sets(beam, _starts_with_one_more(fitted, dry, {}))
-            beam.contact = _contact_values(beam, first[0]) if first else {}
-        tries = [t for one in still for t in _starts_with_one_more(fitted, one, beam.contact)]
-        ends += _fit_sets(beam, tries)
+    dry = next((one for one in plain if one.effect.dry), None)
+    if dry is not None and not beam.contact:
+        first = _fit_sets(beam, _starts_with_one_more(fitted, dry, {}))
+        beam.contact = _contact_values(beam, first[0]) if first else {}
+    tries = [t for one in plain for t in _starts_with_one_more(fitted, one, beam.contact)]
+    ends = _fit_sets(beam, tries)
     if beam.best and not beam.open_outputs(beam.best):
         return
     wider = [one for one in screened if one not in plain]
@@ -471,15 +463,6 @@ def _starts_with_one_more(fitted: Fit, one: Screened, contact: Mapping[str, floa
     return [(effects, {**beside, **fitted.values, **start}, fitted) for start in one.starts]
 
 
-def _starts_with_two_more(fitted: Fit, one: Screened, other: Screened) -> list[Try]:
-    """Return the starts of a set with two effects more; none if these share a parameter."""
-    if keys_of([one.effect]) & keys_of([other.effect]):
-        return []
-    effects = (*fitted.effects, one.effect, other.effect)
-    pairs = product(one.starts, other.starts)
-    return [(effects, {**fitted.values, **first, **second}, fitted) for first, second in pairs]
-
-
 def _contact_values(beam: Beam, fitted: Fit) -> Start:
     """Return the presliding parameters of a fit that are nuisance parameters."""
     keys = {one.value_key(p) for one in beam.problem.case.contact for p in one.free}
@@ -521,7 +504,7 @@ def _sets_with_other_law(beam: Beam, fitted: Fit, library: Sequence[Effect]) -> 
 
 
 def _starts_with_other_law(beam: Beam, fitted: Fit, old: Effect, law: Effect) -> list[Try]:
-    """Return the starts of a law in place of a fitted law.
+    """Return the start of a law in place of a fitted law.
 
     Common parameters start at their fitted values. None if neither law contains the other.
     """
@@ -532,7 +515,7 @@ def _starts_with_other_law(beam: Beam, fitted: Fit, old: Effect, law: Effect) ->
     case, known = beam.problem.case, beam.fits.get(names_of((*rest, law)))
     ours = {law.value_key(p) for p in law.free}
     found = {} if known is None else {k: v for k, v in known.values.items() if k in ours}
-    start, higher = {**found, **fitted.values}, Start()
+    start = {**found, **fitted.values}
     for p in law.free if not found else ():
         same = next((q for q in old.free if q.key == p.key and q.mode == p.mode), None)
         level = next((q for q in old.free if q.key == p.above), None)
@@ -542,9 +525,7 @@ def _starts_with_other_law(beam: Beam, fitted: Fit, old: Effect, law: Effect) ->
             filed = level.nominal(case.nominal, case.control)
             running = float(level.entered(filed, fitted.values[old.value_key(level)]))
             start[law.value_key(p)] = (1.0 + MINOR) * running
-            higher[law.value_key(p)] = MORE * running
-    effects = (*rest, law)
-    return [(effects, start, fitted), *([(effects, start | higher, fitted)] if higher else [])]
+    return [((*rest, law), start, fitted)]
 
 
 def _fit_sets(beam: Beam, tries: Sequence[Try]) -> list[Fit]:
@@ -616,21 +597,15 @@ def _finish(beam: Beam) -> None:
     problem = beam.problem
     ranked = [names for names in beam.leading() if names and names not in beam.finished]
 
-    def finish(names: Names) -> list[Fit]:
+    def finish(names: Names) -> Fit:
         fitted = beam.fits[names]
-        done = problem.fit(fitted.effects, fitted.values, None, OWN, fitted)
-        anew = problem.case.but_for_contact(done.values)
-        known = names != beam.best or anew == dict(done.values)
-        if known or "loader" not in beam.unexplained(stage_gaps(problem.outputs, done.rig)):
-            return [done]
-        return [done, problem.fit(fitted.effects, anew)]
+        return problem.fit(fitted.effects, fitted.values, None, OWN, fitted)
 
-    for names, fits in zip(ranked, in_threads(finish, ranked), strict=True):
+    for names, fit in zip(ranked, in_threads(finish, ranked), strict=True):
         beam.finished.add(names)
         # A fit with coarse steps has another residual: its evidence is not comparable.
         del beam.fits[names], beam.known[names]
-        for fit in fits:
-            beam.add(fit)
+        beam.add(fit)
     beam.recount()
 
 

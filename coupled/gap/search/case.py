@@ -260,11 +260,6 @@ class Case:
         lefts = ((one, one.residual(found.rig)) for one in touched(self.outputs, [effect]))
         return [(one, one.residual(without) - left, left) for one, left in lefts]
 
-    def but_for_contact(self, values: Mapping[str, float]) -> dict[str, float]:
-        """Return fitted values without the presliding parameters."""
-        contact = {one.value_key(p) for one in self.contact for p in one.free}
-        return {key: value for key, value in values.items() if key not in contact}
-
     def with_contact(
         self, effects: Sequence[Effect], free: Sequence[Effect], start: Mapping[str, float]
     ) -> dict[str, float]:

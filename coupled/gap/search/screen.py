@@ -6,10 +6,8 @@ their size. The projection is independent of scale. A fit starts from the size o
 
 The power of the projection is the statistic of the score test, and gives the predicted gain in
 log-likelihood (Rao, Math. Proc. Camb. Phil. Soc. 44, 1948). An effect is fitted only if this gain
-exceeds its log prior. Two effects may be significant together and not alone, since a residual with
-one of them has a long correlation time and few effective samples. If no single effect is worth a
-fit, the best pair is screened by the projection on both signatures. Signatures depend little on the
-other effects of a set. They are computed once, and again only with the best set.
+exceeds its log prior. Signatures depend little on the other effects of a set. They are computed
+once, and again only with the best set.
 
 A candidate may be significant only if the sizes of the present effects change with it: a wrong
 scale takes most of the residual of damping and friction. The best candidate by the part of its
@@ -39,9 +37,7 @@ from coupled.gap.thresholds import (
     BEAM_SIZES,
     LIMIT_BISECTIONS,
     LIMIT_SHARES,
-    MINOR,
     NEGLIGIBLE,
-    PRIOR_EFFECT,
     SCREEN_LESS,
     SCREEN_NEAR,
     SERVO_SHARES,
@@ -131,40 +127,6 @@ class Screen:
         found.sort(key=lambda one: -one.taken)
         least = SCREEN_NEAR * found[0].taken if found else 0.0
         return [one for one in found[:most] if one.taken >= least]
-
-    def still_worth(
-        self, current: Fit, screened: Sequence[Screened], worth: Worth
-    ) -> list[Screened]:
-        """Return the screened candidates whose gain, with other effective samples, is enough."""
-        again = [self._screened(current, e.effect, worth.counts, e.refitted) for e in screened]
-        return [one for one, now in zip(screened, again, strict=True) if now.gain > worth.least]
-
-    def pair(
-        self, current: Fit, candidates: Sequence[Effect], worth: Worth
-    ) -> tuple[Screened, Screened] | None:
-        """Return the two candidates of one output with the largest joint projection.
-
-        None if the predicted gain is too small for two effects. Effective samples follow from the
-        residual without both. The signatures are those that `best` has computed.
-        """
-        groups: dict[tuple[int, ...], list[Effect]] = {}
-        for effect in candidates:
-            groups.setdefault(tuple(self._ours(effect)), []).append(effect)
-        found: tuple[float, tuple[Screened, Screened]] | None = None
-        for ours, effects in groups.items():
-            each = [self._screened(current, effect, worth.counts) for effect in effects]
-            each = [one for one in each if one.starts]
-            if len(each) < 2:
-                continue
-            now = _residual(self.problem, effects[0], current.rig)
-            shapes = np.array([one.direction for one in each])
-            i, j = _best_two(shapes, now)
-            both = shapes[[i, j]].T
-            left = now - both @ np.linalg.lstsq(both, now, rcond=None)[0]
-            gain = self._gain(ours, now, left, self._samples(ours, left))
-            if gain > worth.least + PRIOR_EFFECT and (found is None or gain > found[0]):
-                found = gain, (each[i], each[j])
-        return None if found is None else found[1]
 
     def _ours(self, effect: Effect) -> list[int]:
         """Return the indices of the outputs in which an effect shows."""
@@ -273,17 +235,6 @@ class Screen:
                     change = (_residual(self.problem, effect, rig) - now) / part
                     found.append(_Signature(values, shape, change))
         return found
-
-
-def _best_two(shapes: Floats, now: Floats) -> tuple[int, int]:
-    """Return the indices of the two unit vectors with the largest joint projection."""
-    alike = np.clip(shapes @ shapes.T, -1.0, 1.0)
-    np.fill_diagonal(alike, 1.0)
-    own, apart = shapes @ now, np.maximum(1.0 - alike**2, 1e-300)
-    power = own[:, None] ** 2 + own**2 - 2.0 * alike * np.outer(own, own)
-    power = np.where(np.abs(alike) < 1.0 - MINOR, power / apart, 0.0)
-    i, j = np.unravel_index(int(np.argmax(power)), power.shape)
-    return int(i), int(j)
 
 
 def _residual(problem: Problem, effect: Effect, rig: Rig) -> Floats:
