@@ -100,16 +100,37 @@ class Beam:
         """Make the screen of candidates, which caches their signatures."""
         self.screen = Screen(self.problem, self.error)
 
-    def add(self, fitted: Fit) -> None:
-        """Add a fit; of two fits of a set keep the admissible one, then that of higher evidence."""
+    def add(self, fitted: Fit) -> bool:
+        """Add a fit; of two fits of a set keep the admissible one, then that of higher evidence.
+
+        Return whether it is kept.
+        """
         names = names_of(fitted.effects)
-        new = evidence(self.problem, fitted, self.error)
+        fitted, new = self.likelier(fitted)
 
         def rank(fit: Fit, known: Evidence) -> tuple[bool, float]:
             return is_admissible(self.problem, fit), known.log(self.counts)
 
-        if names not in self.fits or rank(fitted, new) > rank(self.fits[names], self.known[names]):
+        kept = names not in self.fits or rank(fitted, new) > rank(
+            self.fits[names], self.known[names]
+        )
+        if kept:
             self.fits[names], self.known[names] = fitted, new
+        return kept
+
+    def likelier(self, fitted: Fit) -> tuple[Fit, Evidence]:
+        """Return a fit, or the same with the nuisance parameters without effects, and its evidence.
+
+        Least squares count every frame, the evidence independent samples: beside a large gap, a fit
+        may spoil a prior or another output by a nuisance parameter, for less than that costs. A fit
+        with less evidence than no effect may then be better with the nuisance parameters of that.
+        """
+        new = evidence(self.problem, fitted, self.error)
+        if not len(self.counts) or new.log(self.counts) >= self.log(frozenset()):
+            return fitted, new
+        plain = self.problem.with_nuisances(fitted, self.without_effects.values)
+        other = evidence(self.problem, plain, self.error)
+        return (plain, other) if other.log(self.counts) > new.log(self.counts) else (fitted, new)
 
     def log(self, names: Names) -> float:
         """Return the log evidence of a set."""
@@ -182,7 +203,7 @@ class Beam:
 
     def log_of(self, fitted: Fit) -> float:
         """Return the log evidence of a fit, possibly not of this beam."""
-        return evidence(self.problem, fitted, self.error).log(self.counts)
+        return self.likelier(fitted)[1].log(self.counts)
 
     def behind(self, fitted: Fit) -> float:
         """Return the log evidence by which a fit, possibly not of this beam, is behind the best."""
@@ -585,10 +606,8 @@ def _continue_fits(beam: Beam, started: Sequence[Started]) -> None:
         return problem.fit(fit.effects, fit.values, parent, COARSE, fit)
 
     for fit in in_threads(continue_fit, started):
-        beam.add(fit)
-        names = names_of(fit.effects)
-        if beam.fits[names] is fit:
-            beam.finished.discard(names)
+        if beam.add(fit):
+            beam.finished.discard(names_of(fit.effects))
     beam.recount()
 
 
