@@ -39,6 +39,11 @@ def second(original: Original, first: Any, argument: Any, *args: Any, **options:
     return argument
 
 
+def third(original: Original, first: Any, other: Any, argument: Any, *args: Any) -> Any:
+    """Take the place of a method that selects of its second argument: return it whole."""
+    return argument
+
+
 def idle(original: Original, *args: Any, **options: Any) -> None:
     """Take the place of a rule that only adds fits to a beam."""
 
@@ -96,6 +101,8 @@ RULES = (
          "screening deducts the nuisance parameters' penalty"),
     Rule("strained", "search.beam:relief_of", gives(0.0),
          "a set is explained only within the nuisance parameters' tolerance", "open_outputs"),
+    Rule("best_first", "search.screen:Screen.still_worth", third,
+         "once the most promising candidate is fitted, others must still be worth a fit"),
     Rule("smooth_error", "search.problem:ModelError.smooth",
          lambda original, error, noise: np.ones_like(noise),
          "the model error is as smooth as the gap of which it is a share", fresh=True),

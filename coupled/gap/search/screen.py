@@ -128,6 +128,13 @@ class Screen:
         least = SCREEN_NEAR * found[0].taken if found else 0.0
         return [one for one in found[:most] if one.taken >= least]
 
+    def still_worth(
+        self, current: Fit, screened: Sequence[Screened], worth: Worth
+    ) -> list[Screened]:
+        """Return the screened candidates whose gain, with other effective samples, is enough."""
+        again = [self._screened(current, e.effect, worth.counts, e.refitted) for e in screened]
+        return [one for one, now in zip(screened, again, strict=True) if now.gain > worth.least]
+
     def _ours(self, effect: Effect) -> list[int]:
         """Return the indices of the outputs in which an effect shows."""
         return [k for k, one in enumerate(self.problem.outputs) if one.stage in effect.shows_in]
