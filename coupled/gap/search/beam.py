@@ -121,9 +121,10 @@ class Beam:
     def likelier(self, fitted: Fit) -> tuple[Fit, Evidence]:
         """Return a fit, or the same with the nuisance parameters without effects, and its evidence.
 
-        Least squares count every frame, the evidence independent samples: beside a large gap, a fit
-        may spoil a prior or another output by a nuisance parameter, for less than that costs. A fit
-        with less evidence than no effect may then be better with the nuisance parameters of that.
+        Least squares count every frame, the evidence independent samples. Beside a large gap, a
+        nuisance parameter may therefore be fitted at a value that costs more evidence, by its prior
+        or in another output, than the effects gain. A fit with less evidence than the set without
+        effects may then have more with the nuisance parameters of that set.
         """
         new = evidence(self.problem, fitted, self.error)
         if not len(self.counts) or new.log(self.counts) >= self.log(frozenset()):

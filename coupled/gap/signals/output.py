@@ -263,8 +263,8 @@ class Output:
     def samples(self, left: Floats) -> float:
         """Return the effective samples of a residual: its frames over its autocorrelation time.
 
-        That time is at least the one of the noise floor: a small part of it, such as the drift
-        after a wrong restart, may last long, and a set of effects may take it off.
+        That time is at least the autocorrelation time of the noise floor. A small part of the
+        noise, such as the drift after a wrong restart, may last long, and be fitted by effects.
         """
         return len(left) / max(memory(left), self.lasts)
 

@@ -65,8 +65,8 @@ _KEPT = 128  # size of the cache of flights: most of a search; 0.4 MB each in a 
 class Flights:
     """A cache of a record's last flights, by aircraft, surface motion and motion of the air.
 
-    It also keeps what measuring errors change in a flight: as in the aircraft that was first flown
-    in air of the same gusts, of which another aircraft's changes differ by little.
+    It also keeps the changes of a flight by measuring errors. They are those of the aircraft that
+    was first flown in air of the same gusts, an approximation for another aircraft.
     """
 
     def __init__(self) -> None:
