@@ -287,3 +287,31 @@ def test_another_trim_position_is_not_lower_noise() -> None:
     ).with_lower_noise(rig)
     assert alike is not None
     assert alike.outputs[0].floor == 0.1
+
+
+def test_an_offset_that_hides_another_trim_is_found(tmp_path: Path, rig: Rig) -> None:
+    """The offset moves the surface back to where the nominal aircraft trims."""
+    here = own_trim(rig, "column")
+    there = own_trim(real(rig, "mass", 1.1), "column")
+    points = surface_points(rig, "column")
+    assert points is not None
+    back = command_of(np.array([here, there]), points)
+    offset = float(back[0] - back[1])
+    values = {"mass": {"factor": 1.1}, "rigging_offset": {"offset_norm": offset}}
+    record = made(tmp_path, rig, values, 4)
+    found = trim_of(rig, record, "column")
+    assert found is not None
+    assert found.position == pytest.approx(there, abs=4 * found.error)
+    assert abs(there - here) > 8 * found.error
+    assert found.position + found.jump == pytest.approx(here, abs=1e-4)
+
+
+def test_a_wrong_first_row_is_no_other_trim(tmp_path: Path, rig: Rig) -> None:
+    """The aircraft flies as if it had been in the nominal trim."""
+    record = made(tmp_path, rig, {}, 4)
+    data = record.data.copy()
+    data[0, record.channels.index("elevator_rad")] += 0.01
+    found = trim_of(rig, replace(record, data=data), "column")
+    assert found is not None
+    assert found.position == own_trim(rig, "column")
+    assert found.jump == 0.0

@@ -4,8 +4,9 @@ A record starts in trim. A surface that differs from the model's trim by more th
 two causes. If the aircraft trims elsewhere (other weight, lift or moment), the first row is
 there too, and the aircraft stays in trim. If something moved the surface afterwards (a rigging
 offset), the aircraft responds. The two are compared by the first row, and by the model's residual
-in open-loop flight. If the first row excludes each alone, both are present. Without evidence the
-aircraft's trim is assumed; for a record without motion, a fault of the surface.
+in open-loop flight. If the first row excludes each alone, both are present; they may cancel from
+the second row on, which the flight must show too. Without evidence the aircraft's trim is assumed;
+for a record without motion, a fault of the surface.
 
 The trim is also an output that is compared with the model's trim. With the angle of attack in trim
 it discriminates lift, moment and weight.
@@ -66,14 +67,18 @@ def trim_of(rig: Rig, record: Record, control: ControlName) -> Trim | None:
         at = own if abs(start - own) <= TRIM_SIGMAS * error else start
         return Trim(at, start, error)
     standing, error = off
-    if abs(standing) <= TRIM_SIGMAS * error:
-        return Trim(own, own + standing, error)
     there = own + standing
     unsure = math.hypot(noise, KNOWN)
-    if min(abs(first - own), abs(first - there)) > TRIM_SIGMAS * unsure:  # both causes
-        return Trim(first, first, unsure, there - first)
+    excluded = min(abs(first - own), abs(first - there)) > TRIM_SIGMAS * unsure
+    both = Trim(first, first, unsure, there - first)
+    if abs(standing) <= TRIM_SIGMAS * error:
+        plain = Trim(own, there, error)
+        flown = _followed(rig, record, control, plain, both) if excluded else None
+        return both if flown is not None and flown > RIVAL_GAIN else plain
+    if excluded:
+        return both
     evidence = ((first - own) ** 2 - (first - there) ** 2) / max(noise, 1e-12) ** 2
-    flown = _followed(rig, record, control, own, there)
+    flown = _followed(rig, record, control, Trim(own, own, 0.0, standing), Trim(there, there, 0.0))
     in_trim = evidence > RIVAL_GAIN if flown is None else evidence + flown > -RIVAL_GAIN
     return Trim(there, there, error) if in_trim else Trim(own, own, noise, standing)
 
@@ -150,9 +155,9 @@ def _constant(left: Floats, ordered: Floats, noise: float) -> tuple[float, float
 
 
 def _followed(
-    rig: Rig, record: Record, control: ControlName, own: float, there: float
+    rig: Rig, record: Record, control: ControlName, one: Trim, other: Trim
 ) -> float | None:
-    """Return twice the log-likelihood gain of the surface being in trim at `there`.
+    """Return twice the log-likelihood gain of the `other` trim over the `one`.
 
     None if the record does not have the motion.
     """
@@ -163,7 +168,7 @@ def _followed(
     if not names or rig.flight is None:
         return None
     lefts = []
-    for trim in (Trim(own, own, 0.0, there - own), Trim(there, there, 0.0)):
+    for trim in (one, other):
         surfaces, _ = moved(rig, short, {control: trim}, np.random.default_rng(43))
         given = (rig.flight, rig.frame_rate, flown_by(rig), surfaces, names)
         flown = fly_open_loop(*given, flown_in(short, flown_by(rig), rig.frame_rate))
