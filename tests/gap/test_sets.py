@@ -207,18 +207,6 @@ def test_an_effect_that_spoils_another_stage_is_not_named(first: Floats) -> None
     assert choice.steps[0].rivals == ()
 
 
-@pytest.mark.parametrize(("is_there", "named"), [(True, {"arc_geometry"}), (False, set[str]())])
-def test_a_discrete_effect_is_tried_within_a_stage_s_limit(is_there: bool, named: set[str]) -> None:
-    """A noise floor of twice the noise hides an arc that trebles the residual."""
-
-    def predict(rig: Rig) -> Floats:
-        return np.asarray(1.0 * FIRST * rig.controls["column"].loader.arc_geometry)
-
-    arc = output(1.0 * FIRST * is_there + 0.5 * NOISE, predict, "linkage")
-    assert arc.gap(bench()) < arc.limit
-    assert names(found([arc], [BY_NAME["arc_geometry"]])) == named
-
-
 def test_what_lies_far_below_a_noise_floor_outweighs_no_gap() -> None:
     """Beside an offset of 16 noise floors, δ̂ goes from 0.005 to 0.064 of its own."""
 

@@ -298,17 +298,10 @@ def _search_from(
 def _search_by_depth(beam: Beam, library: Sequence[Effect]) -> tuple[dict[str, float], ...]:
     """Fit the neighbours of the best sets, depth by depth, until one explains every stage.
 
-    Return the gain in log evidence of each depth's sets, by the effect added. Discrete effects are
-    fitted without screening, since their size is fixed. They are fitted in outputs that are not yet
-    explained, and in outputs whose laws are exact, where a high noise floor may mask them.
+    Return the gain in log evidence of each depth's sets, by the effect added.
     """
     front, best, known = beam.leading(), beam.best, set(beam.fits)
     depths = list[tuple[Names, set[Names]]]()
-    if not best:
-        root, shown = beam.fits[best], {*EXACT, *beam.open_outputs(best)}
-        discrete = [e for e in _candidates((), library, shown) if not e.free]
-        _fit_sets(beam, [((e,), dict(root.values), root) for e in discrete])
-        front = list(dict.fromkeys([best, beam.best]))
     for _ in range(BEAM_DEPTH):
         if not front or (best and not beam.open_outputs(best)):
             break
@@ -558,9 +551,10 @@ def _fit_sets(beam: Beam, tries: Sequence[Try]) -> list[Fit]:
     """Fit sets from their starts, add them, and return the best fit of each set.
 
     All starts are fitted for a few evaluations, which need not reach the optimum. A start goes on
-    if it is near the best one, or made at least half of its gain over the parent. The best start of
-    each set is then fitted to convergence; a further start only if the best one leaves an output
-    over its limit.
+    if it is near the best one, or made at least half of its gain over the parent. So does a law of
+    less evidence than one that it contains: it can only be better, so its fit is not at its end.
+    The best start of each set is then fitted to convergence; a further start only if the best one
+    leaves an output over its limit.
     """
     problem = beam.problem
     unique: dict[tuple[Names, tuple[tuple[str, float], ...]], Try] = {}
@@ -577,9 +571,17 @@ def _fit_sets(beam: Beam, tries: Sequence[Try]) -> list[Fit]:
 
     started = sorted(in_threads(start_fit, list(unique.values())), key=lambda one: -one[0])
     most = max(started[0][0], beam.log(beam.best))
-    going = [
-        one for one in started if one[0] > most - max(GIVEN_UP, MOST * (most - beam.log_of(one[2])))
-    ]
+
+    def goes_on(one: Started) -> bool:
+        reached, fit, parent = one
+        behind = beam.log_of(parent)
+        replaced = {*parent.effects} - {*fit.effects}
+        wider = any(contains(law, old) for law in fit.effects for old in replaced)
+        return reached > most - max(GIVEN_UP, MOST * (most - behind)) or (
+            wider and reached < behind
+        )
+
+    going = [one for one in started if goes_on(one)]
     first: dict[Names, Started] = {}
     for one in going:
         first.setdefault(names_of(one[1].effects), one)
