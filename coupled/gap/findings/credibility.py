@@ -6,10 +6,10 @@
    Each half holds half of the power of the effect's contribution to the residual. The size is
    relative to that in all records; its standard error is from the scatter between stretches.
 2. Comparison with a nonparametric model of the stage's own signals (`where`), if a residual
-   remains. `beside_flexible` is the share of the model's residual that adding the effect removes.
-   If the model can represent the effect, this share is small for correct and wrong effects alike.
-   Then `against_flexible` decides: a correct effect, with one parameter, leaves no more than the
-   model with a hundred. Both are omitted for effects from outside the stage, such as gusts.
+   remains. `beside_flexible` is the share of the model's residual that adding the effect removes:
+   what a wrong effect removes, the model's functions remove as well. It is omitted for effects from
+   outside the stage, such as gusts. The motion of an aircraft is no function of its present
+   signals: the residual counts in full.
 
 Both tests weigh more the more residual power remains (`remainder`). The result is one smooth
 number that scales the effect's probability.
@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtr, stdtrit
 
+from coupled.gap.chain import BY_NAME as STAGE_OF
 from coupled.gap.effects.effect import Effect
 from coupled.gap.findings.where import free_share, response, signals
 from coupled.gap.noise.smooth import smoothed
@@ -176,17 +177,17 @@ class Credibility:
     """Results of the tests of one effect.
 
     `remainder` is the weight of the residual that remains, 0 to 1 (`remainder`). `beside_flexible`
-    and `against_flexible` (residual power of the nonparametric model over that with the effects)
-    are None if hardly any residual remains. `exact`: the stage is computed by the host without
-    noise, so the limit of the drift is lower and no residual may remain.
+    is None if hardly any residual remains. `in_full`: no residual may remain, since the model of
+    signals has no power. `exact`: the stage is computed by the host without noise, so the limit of
+    the drift is lower too.
     """
 
     effect: str
     regimes: tuple[Regime, ...]
     beside_flexible: float | None = None
-    against_flexible: float | None = None
     remainder: float = 0.0
     exact: bool = False
+    in_full: bool = False
 
     @property
     def drift(self) -> float:
@@ -209,12 +210,11 @@ class Credibility:
     def value(self) -> float:
         """The credibility: 1 for a stationary size that the signals do not replace, down to 0."""
         same = 1.0 / (1.0 + (self.drift / (HOST_DRIFT if self.exact else DRIFT)) ** 4)
-        if self.exact:
+        if self.exact or self.in_full:
             return same * (1.0 - self.remainder)
-        if self.beside_flexible is None or self.against_flexible is None:
+        if self.beside_flexible is None:
             return same
         needed = (1.0 - PARTLY) / max(self.beside_flexible, 1e-9)
-        needed = min(needed, 1.0 / max(self.against_flexible, 1e-9))
         return same * (1.0 - self.remainder * (1.0 - 1.0 / (1.0 + needed**8)))
 
     def as_dict(self) -> dict[str, Any]:
@@ -222,7 +222,6 @@ class Credibility:
         found: dict[str, Any] = {"value": self.value, "drift": self.drift, "p": self.p_value}
         if self.beside_flexible is not None:
             found |= {"remainder": self.remainder, "beside_flexible": self.beside_flexible}
-            found["against_flexible"] = self.against_flexible
         return found | {"regimes": [one.as_dict() for one in self.regimes]}
 
 
@@ -252,24 +251,18 @@ def credibility(
         return replace(plain, exact=True)
     if remains < FEW or not acts or effect.signature.drawing == "time":
         return plain
+    if STAGE_OF[effect.stage].flown:
+        return replace(plain, in_full=True)
     most = max(acts, key=lambda one: float(one.action @ one.action))
-    beside, against = _flexible(case, found, most)
-    return replace(plain, beside_flexible=beside, against_flexible=against)
+    return replace(plain, beside_flexible=_beside_flexible(case, found, most))
 
 
-def _flexible(case: Case, found: Fit, one: Acts) -> tuple[float, float]:
-    """Return `beside_flexible` and `against_flexible` of an effect in one output.
-
-    These are the share of the nonparametric model's residual power that the effect removes, and
-    that residual power, without the effect, over the power that the effects leave.
-    """
+def _beside_flexible(case: Case, found: Fit, one: Acts) -> float:
+    """Return the share of the nonparametric model's residual power that an effect removes."""
     known = signals(one.output, one.left, one.record, case.control)
     answers = response(one.output, found.rig, one.record, case.control)
     leaves = []
     for left in (one.left, one.left + one.action):
         share, _ = free_share(one.output, left, known, answers)
         leaves.append(float(left @ left) * (1.0 - share))
-    if leaves[1] <= 0.0:
-        return 0.0, 0.0
-    power = max(float(one.left @ one.left), 1e-300)
-    return 1.0 - leaves[0] / leaves[1], leaves[1] / power
+    return 1.0 - leaves[0] / leaves[1] if leaves[1] > 0.0 else 0.0

@@ -16,6 +16,7 @@ from typing import Any, Literal
 from coupled.arguments import public
 from coupled.errors import InputError
 from coupled.files import check_format
+from coupled.gap.chain import BY_NAME
 from coupled.gap.effects.airframe import TERM
 from coupled.gap.effects.effect import dotted
 from coupled.gap.findings.budget import StageBudget
@@ -89,6 +90,8 @@ class StageResult:
         if self.left is None or self.settled is None:
             return 0.0
         predicted = 1.0 if self.remains is None else self.remains.free_share
+        if BY_NAME[self.name].flown:  # the motion is no function of present signals
+            predicted = 1.0
         own = self.left * math.sqrt(1.0 - predicted)
         return remainder(self.settled, self.left, self.explained_below, own)
 
