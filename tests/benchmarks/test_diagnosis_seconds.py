@@ -1,4 +1,4 @@
-"""What one diagnosis of a 60 s record costs by what is found, in wall and processor seconds.
+"""What a diagnosis of a 60 s record costs by what is found, in wall and processor seconds.
 
     OPENBLAS_NUM_THREADS=1 COUPLED_BENCHMARKS=keep \
         pytest -m bench tests/benchmarks/test_diagnosis_seconds.py -s
@@ -19,9 +19,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+import coupled
 from coupled.gap.diagnose import diagnose
 from coupled.record.record import Record
-from tests.support import gaps
+from tests.support import gaps, threecontrols
+from tests.support.airframes import noisy
 from tests.support.benchmarks import keep
 
 resource = pytest.importorskip("resource")  # not on Windows
@@ -63,6 +65,15 @@ def dead_zone(grip_m: Floats) -> Floats:
     return np.asarray(grip_m - np.clip(grip_m, -2e-3, 2e-3))
 
 
+THREE_CONTROLS: dict[str, dict[str, float]] = {
+    "none": {},
+    "a bend of the column": {"controls.column.loader.bend_m_per_N": 2e-4},
+    "roll damping": {"flight.roll_damping": 0.7},
+    "a bend of the wheel and elevator effectiveness": {
+        "controls.wheel.loader.bend_rad_per_N": 2e-3,
+        "flight.elevator_effectiveness": 0.8,
+    },
+}
 OUTSIDE = {"an intermittent jam": jams, "a dead zone of the reading": dead_zone}
 
 
@@ -106,3 +117,20 @@ def test_a_diagnosis_by_all_cores_is_that_of_one_and_its_seconds(
     figures["peak_MB"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
     print(f"\nat most {figures['peak_MB']:.0f} MB of memory")
     keep("diagnosis of 60 s", figures, load)
+
+
+def test_the_seconds_of_a_diagnosis_of_three_controls() -> None:
+    load = os.getloadavg()[0]
+    rig = noisy(coupled.load_rig("c172p"))
+    figures: dict[str, float] = {}
+    for name, values in THREE_CONTROLS.items():
+        record = threecontrols.flown(rig, values, 60.0, pedals=160.0)
+        if not figures:
+            diagnose(rig, {"r": record.between(0.0, 12.0)}).as_dict()
+        wall_s = time.perf_counter()
+        found = diagnose(rig, {"r": record})
+        found.as_dict()
+        figures[name] = time.perf_counter() - wall_s
+        print(f"\n{name}: {figures[name]:.1f} s")
+        assert len(found.effects) == len(values)
+    keep("diagnosis of 60 s of three controls", figures, load)

@@ -137,10 +137,12 @@ def diagnosis_seconds() -> str:
     unknown = max(s for what, s in taken.items() if what.startswith(OUTSIDE))
     found = {w: s for w, s in taken.items() if w != "none" and not w.startswith(OUTSIDE)}
     quick, slow = min(found, key=found.__getitem__), max(found, key=found.__getitem__)
+    every = kept_figures("diagnosis of 60 s of three controls").values()
+    most = f" With three controls it takes up to {max(every):.1f} s." if every else ""
     return (
         f"A record of 60 s takes {taken['none']:.1f} s without a gap, {found[quick]:.1f} s"
         f" ({quick}) to {found[slow]:.1f} s ({slow}) with one effect, and up to {unknown:.1f} s"
-        f" where none explains it {under(name)}."
+        f" where none explains it {under(name)}.{most}"
     )
 
 
