@@ -221,6 +221,27 @@ def test_what_lies_far_below_a_noise_floor_outweighs_no_gap() -> None:
     assert names(choice) == {"force_offset"}
 
 
+def test_a_law_that_fits_worse_than_one_it_contains_is_not_at_its_end() -> None:
+    """A mode at a third of the frequency where its fit starts, which takes more than a few steps.
+
+    It is worse than a bend at first, and was given up.
+    """
+    bend, mode = BY_NAME["bend"], BY_NAME["structural_mode"]
+
+    def predict(rig: Rig) -> Floats:
+        loader = rig.controls["column"].loader
+        rate_Hz = loader.bend_frequency
+        away = np.tanh(np.log(rate_Hz / 13.8)) if rate_Hz > 0.0 else 0.5
+        return np.asarray(1e5 * loader.bend * (FIRST + 0.3 * away * SECOND))
+
+    number = replace(mode.parameters[1], starts=(40.0,))
+    slow = replace(mode, parameters=(mode.parameters[0], number))
+    real = bench({"bend_m_per_N": 2e-4, "bend_frequency_Hz": 13.8})
+    linkage = output(predict(real) + NOISE, predict, "linkage")
+    choice = found([linkage], [bend, slow], bench({"bend_m_per_N": 1e-4}))
+    assert names(choice) == {"structural_mode"}
+
+
 @pytest.mark.parametrize(("frame_rate_Hz", "possible"), [(120.0, False), (240.0, True)])
 def test_a_mode_faster_than_the_frames_show_is_no_effect(
     frame_rate_Hz: float, possible: bool
