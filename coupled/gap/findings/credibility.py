@@ -88,7 +88,12 @@ class Acts:
 
 
 def regimes(case: Case, acts: Sequence[Acts]) -> tuple[Regime, ...]:
-    """Return the sizes in halves by every signal that divides the effect's contribution."""
+    """Return the sizes in halves by every signal that divides the effect's contribution.
+
+    Outputs in which the effect hardly acts, and their signals, are left out.
+    """
+    powers = [float(one.action @ one.action) for one in acts]
+    acts = [one for one, power in zip(acts, powers, strict=True) if power > FEW * sum(powers)]
     by: dict[str, list[tuple[Acts, Floats]]] = {}
     for one in acts:
         for name, signal in _dividing(case, one).items():
