@@ -365,6 +365,26 @@ def test_what_is_not_certain_with_all_its_rivals_is_incredible(
     assert ("force_scale" in incredible(choice, [found])) is said
 
 
+def test_an_output_in_which_an_effect_hardly_acts_does_not_doubt_it() -> None:
+    """Of a record with a residual that goes with the deflection in that output."""
+    rng, rate_Hz = np.random.default_rng(3), 50.0
+    times = np.arange(6000) / rate_Hz
+    place = 0.05 * np.sin(0.9 * times) + 0.02 * np.sin(2.3 * times)
+    names = ("time_s", "column_force_N", "column_computed_m", "column_deflection_m")
+    read = Record(names, np.column_stack((times, 40.0 * place, place, place)))
+    rig = bench()
+
+    def acts(stage: str, channel: str, size: float, left: NDArray[np.float64]) -> Acts:
+        output = Output(stage, channel, read[channel], lambda _: read[channel], 1.0, rate_Hz)
+        return Acts(output, read, size * place, left)
+
+    much = acts("linkage", "column_deflection_m", 200.0, rng.normal(size=6000))
+    little = acts("loader", "column_computed_m", 5.0, 3.0 * place * np.abs(place) / 0.05)
+    case = Case(rig, "column", [much.output, little.output])
+    assert min(one.p_value for one in regimes(case, [little])) < 1e-6
+    assert regimes(case, [much, little]) == regimes(case, [much])
+
+
 @pytest.mark.slow
 def test_a_diagnosis_blames_no_stage_by_what_is_incredible(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
