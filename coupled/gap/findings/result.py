@@ -16,7 +16,6 @@ from typing import Any, Literal
 from coupled.arguments import public
 from coupled.errors import InputError
 from coupled.files import check_format
-from coupled.gap.chain import BY_NAME
 from coupled.gap.effects.airframe import TERM
 from coupled.gap.effects.effect import dotted
 from coupled.gap.findings.budget import StageBudget
@@ -30,6 +29,8 @@ from coupled.schema import Lenient, quantity, read_as
 # Of the JSON. A file without a format is read as one from before formats were numbered; a newer
 # format is refused (`files.check_format`).
 FORMAT = 3
+# Stages whose laws have an error of their own: a host's schedule and a model's motion have none.
+OF_THE_MACHINE = ("loader", "linkage", "surface")
 Verdict = Literal["no_gap", "effect", "mostly", "ambiguous", "unexplained"]
 
 
@@ -89,10 +90,9 @@ class StageResult:
         """The weight of the remaining residual as evidence against the effects (`credibility`)."""
         if self.left is None or self.settled is None:
             return 0.0
-        predicted = 1.0 if self.remains is None else self.remains.free_share
-        if BY_NAME[self.name].flown:  # the motion is no function of present signals
-            predicted = 1.0
-        own = self.left * math.sqrt(1.0 - predicted)
+        own = 1.0
+        if self.remains is not None and self.name in OF_THE_MACHINE:
+            own = self.left * math.sqrt(1.0 - self.remains.free_share)
         return remainder(self.settled, self.left, self.explained_below, own)
 
     @property
