@@ -57,7 +57,8 @@ def main(asked: list[str]) -> None:
         said = answer(found)
         counts[said] = counts.get(said, 0) + 1
         effects = ", ".join(f"{one.name} {one.probability:.2f}" for one in found.effects)
-        gaps = ", ".join(f"{s.name} {s.gap:.1f} to {s.left:.1f}" for s in found.stages if s.guilty)
+        judged = (one for one in found.stages if one.guilty and one.left is not None)
+        gaps = ", ".join(f"{one.name} {one.gap:.1f} to {one.left:.1f}" for one in judged)
         print(f"{name}| {said}| {effects}| {gaps}", flush=True)
     print(counts)
 
