@@ -146,15 +146,15 @@ def test_a_rig_that_flies_further_from_the_record_is_not_offered() -> None:
     assert not nearer([better, worse])
 
 
-def test_an_effect_that_does_as_well_as_a_free_model_is_credible() -> None:
-    """What a free model contains takes nothing beside it; what it does better than is doubtful."""
+def test_an_effect_that_removes_what_a_free_model_cannot_is_credible() -> None:
+    """What a free model makes as well is doubtful in proportion to what remains."""
     same = (Regime("time_s", 1.0, 1.0, 0.01, 0.01, 20),)
-    assert Credibility("play", same, 0.2, 2.0, 1.0).value > 0.95
-    assert Credibility("bend", same, 0.99, 0.3, 1.0).value > 0.85
-    assert Credibility("imitation", same, 0.5, 0.5, 1.0).value < 0.05
-    assert Credibility("between", same, 0.0, 1.0, 1.0).value == pytest.approx(0.5, abs=0.01)
+    assert Credibility("bend", same, 0.99, 1.0).value > 0.85
+    assert Credibility("imitation", same, 0.5, 1.0).value < 0.05
+    assert Credibility("imitation", same, 0.5, 0.1).value > 0.85
+    assert Credibility("between", same, 0.75, 1.0).value == pytest.approx(0.5, abs=0.01)
     drifts = (Regime("time_s", 0.5, 1.5, 0.01, 0.01, 20),)
-    assert Credibility("drifts", drifts, 0.2, 2.0, 1.0).value < 0.05
+    assert Credibility("drifts", drifts, 0.99, 1.0).value < 0.05
 
 
 def test_a_models_own_error_may_be_alike_in_all_of_a_half() -> None:
