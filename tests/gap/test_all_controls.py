@@ -194,6 +194,7 @@ def test_the_effects_of_two_parts_are_those_of_each_alone() -> None:
         assert found.stage(name).gap == pytest.approx(alone.stage(stage).gap, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_the_json_names_the_control_of_each_effect() -> None:
     table = whole(*WORN.items()).as_dict()
     assert [(one["name"], one["control"]) for one in table["in_flight"]] == [

@@ -48,7 +48,7 @@ def test_a_healthy_record_may_begin_in_motion(without: str) -> None:
     assert any(stage.name == "loader" and stage.gap is not None for stage in found.stages)
 
 
-@pytest.mark.parametrize("without", ["", "column_computed_m"])
+@pytest.mark.parametrize("without", ["", pytest.param("column_computed_m", marks=pytest.mark.slow)])
 def test_what_is_found_does_not_depend_on_the_cut(without: str) -> None:
     rig = bench({})
     found = diagnose(rig, {"r": moved(rig, {LOADER + "friction_N": 4.0}, without)})

@@ -34,7 +34,7 @@ LONG |= {"elevator_effectiveness", "vertical_gust", "coulomb_friction"}
 LONG |= {"pitch_stiffness", "lift_slope", "mass", "inertia", "modifying_lag", "presliding_friction"}
 LONG |= {"stiffening_bend", "cable_stretch", "surface_freeplay", "rigging_offset"}
 LONG |= {"surface_rate_limit", "servo_rate_limit", "pitch_damping"}
-LONG |= {"servo_lag", "deflection_zero", "pressure_scale"}
+LONG |= {"servo_lag", "deflection_zero", "pressure_scale", "bend"}
 
 # Friction by direction is even friction of the mean with an offset of half the difference: the
 # records do not distinguish them.

@@ -43,7 +43,10 @@ def test_three_moving_controls_are_no_gap(cessna: Rig) -> None:
 
 @pytest.mark.parametrize(
     ("control", "name", "value"),
-    [("wheel", "surface_lag", 0.06), ("pedals", "rigging_offset", 0.02)],
+    [
+        ("wheel", "surface_lag", 0.06),
+        pytest.param("pedals", "rigging_offset", 0.02, marks=pytest.mark.slow),
+    ],
 )
 def test_a_surface_of_wheel_and_pedals_is_judged(
     cessna: Rig, control: ControlName, name: str, value: float
