@@ -147,7 +147,7 @@ def test_a_rig_that_flies_further_from_the_record_is_not_offered() -> None:
 
 
 def test_an_effect_that_removes_what_a_free_model_cannot_is_credible() -> None:
-    """What a free model makes as well is doubtful in proportion to what remains."""
+    """If functions of the signals remove the same, the effect is doubtful by what remains."""
     same = (Regime("time_s", 1.0, 1.0, 0.01, 0.01, 20),)
     assert Credibility("bend", same, 0.99, 1.0).value > 0.85
     assert Credibility("imitation", same, 0.5, 1.0).value < 0.05

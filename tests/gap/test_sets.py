@@ -207,6 +207,17 @@ def test_an_effect_that_spoils_another_stage_is_not_named(first: Floats) -> None
     assert choice.steps[0].rivals == ()
 
 
+def test_a_residual_within_its_limit_has_no_effect_of_a_fixed_size() -> None:
+    """An arc in the linkage, below a noise floor of twice the noise."""
+
+    def predict(rig: Rig) -> Floats:
+        return np.asarray(FIRST * rig.controls["column"].loader.arc_geometry)
+
+    arc = output(FIRST + 0.5 * NOISE, predict, "linkage")
+    assert arc.gap(bench()) < arc.limit
+    assert names(found([arc], [BY_NAME["arc_geometry"]])) == set()
+
+
 def test_what_lies_far_below_a_noise_floor_outweighs_no_gap() -> None:
     """Beside an offset of 16 noise floors, δ̂ goes from 0.005 to 0.064 of its own."""
 
@@ -222,10 +233,7 @@ def test_what_lies_far_below_a_noise_floor_outweighs_no_gap() -> None:
 
 
 def test_a_law_that_fits_worse_than_one_it_contains_is_not_at_its_end() -> None:
-    """A mode at a third of the frequency where its fit starts, which takes more than a few steps.
-
-    It is worse than a bend at first, and was given up.
-    """
+    """The mode's fit starts at three times its frequency, with less evidence than a bend."""
     bend, mode = BY_NAME["bend"], BY_NAME["structural_mode"]
 
     def predict(rig: Rig) -> Floats:

@@ -6,10 +6,10 @@
    Each half holds half of the power of the effect's contribution to the residual. The size is
    relative to that in all records; its standard error is from the scatter between stretches.
 2. Comparison with a nonparametric model of the stage's own signals (`where`), if a residual
-   remains. `beside_flexible` is the share of the model's residual that adding the effect removes:
-   what a wrong effect removes, the model's functions remove as well. It is omitted for effects from
-   outside the stage, such as gusts. The motion of an aircraft is no function of its present
-   signals: the residual counts in full.
+   remains. `beside_flexible` is the share of the model's residual that adding the effect removes.
+   It is small for a wrong effect, since functions of the signals remove the same. The comparison is
+   omitted for effects from outside the stage, such as gusts. The motion of an aircraft is no
+   function of its present signals, so the residual of the airframe counts in full.
 
 Both tests weigh more the more residual power remains (`remainder`). The result is one smooth
 number that scales the effect's probability.
@@ -90,7 +90,7 @@ class Acts:
 def regimes(case: Case, acts: Sequence[Acts]) -> tuple[Regime, ...]:
     """Return the sizes in halves by every signal that divides the effect's contribution.
 
-    Outputs in which the effect hardly acts, and their signals, are left out.
+    Outputs with at most 2 % of the contribution's power, and their signals, are left out.
     """
     powers = [float(one.action @ one.action) for one in acts]
     acts = [one for one, power in zip(acts, powers, strict=True) if power > FEW * sum(powers)]

@@ -551,10 +551,10 @@ def _fit_sets(beam: Beam, tries: Sequence[Try]) -> list[Fit]:
     """Fit sets from their starts, add them, and return the best fit of each set.
 
     All starts are fitted for a few evaluations, which need not reach the optimum. A start goes on
-    if it is near the best one, or made at least half of its gain over the parent. So does a law of
-    less evidence than one that it contains: it can only be better, so its fit is not at its end.
-    The best start of each set is then fitted to convergence; a further start only if the best one
-    leaves an output over its limit.
+    if it is near the best one, or made at least half of its gain over the parent. A start of a law
+    goes on too if its evidence is below that of a contained law: the optimum of the wider law is at
+    least as good. The best start of each set is then fitted to convergence; a further start only if
+    the best one leaves an output over its limit.
     """
     problem = beam.problem
     unique: dict[tuple[Names, tuple[tuple[str, float], ...]], Try] = {}

@@ -4,9 +4,9 @@ A record starts in trim. A surface that differs from the model's trim by more th
 two causes. If the aircraft trims elsewhere (other weight, lift or moment), the first row is
 there too, and the aircraft stays in trim. If something moved the surface afterwards (a rigging
 offset), the aircraft responds. The two are compared by the first row, and by the model's residual
-in open-loop flight. If the first row excludes each alone, both are present; they may cancel from
-the second row on, which the flight must show too. Without evidence the aircraft's trim is assumed;
-for a record without motion, a fault of the surface.
+in open-loop flight. If the first row excludes each alone, both causes are present. If the two
+cancel from the second row on, the flight must confirm them as well. Without evidence the aircraft's
+trim is assumed; for a record without motion, a fault of the surface.
 
 The trim is also an output that is compared with the model's trim. With the angle of attack in trim
 it discriminates lift, moment and weight.
