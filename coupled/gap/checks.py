@@ -89,8 +89,23 @@ def check_record(
         if not np.all(np.isfinite(record[name])):
             row = int(np.argmax(~np.isfinite(record[name])))
             raise InputError(file, name, f"row {row + 2} holds no number")
+    if rig.flight is not None:
+        _check_angles(record, file)
     if rig.controls and moved:
         _check_channels(rig, record, control, file)
+
+
+def _check_angles(record: Record, file: object) -> None:
+    """Raise InputError if an angle or a rate of the motion, or a surface, is beyond that in flight.
+
+    Roll and heading may be counted on over full turns, so that their size shows no unit.
+    """
+    turning = ("roll_rad", "heading_rad")
+    angles = (one for one in (*LONGITUDINAL, *LATERAL) if one.endswith(("_rad", "_rad_per_s")))
+    for name in (one for one in angles if one in record and one not in turning):
+        if plausible.size_doubt(name, record[name]) is not None:
+            most = float(np.max(np.abs(record[name])))
+            raise InputError(file, name, f"reaches {most:.3g}: is it in degrees?")
 
 
 def _check_short(record: Record, control: ControlName, file: object) -> None:

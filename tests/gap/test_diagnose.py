@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import numpy as np
 import pytest
 
 from coupled.errors import InputError
+from coupled.gap.checks import check_record
 from coupled.gap.diagnose import diagnose
 from coupled.gap.effects.effect import apply
 from coupled.gap.effects.library import BY_NAME, EFFECTS
@@ -171,6 +173,27 @@ def test_bad_records_are_refused_in_one_line(tmp_path: Path) -> None:
         with pytest.raises(InputError, match=says.replace("?", r"\?")) as caught:
             diagnose(nominal, {"r.csv": record}, "column")
         assert str(caught.value).startswith("r.csv: ")
+
+
+@pytest.mark.parametrize("name", ["elevator_rad", "alpha_rad", "pitch_rad", "pitch_rate_rad_per_s"])
+def test_a_motion_in_degrees_is_refused(name: str) -> None:
+    """A pitch attitude in degrees was no gap, an elevator in degrees a loss of its effect."""
+    rig = nominal_rig(True)
+    time_s = np.arange(720) / rig.frame_rate
+    swings = np.sin(3.0 * time_s)
+    moves = {
+        "elevator_rad": 0.07,
+        "alpha_rad": 0.065,
+        "pitch_rad": 0.4,
+        "pitch_rate_rad_per_s": 0.2,
+    }
+    moved = {**moves, name: np.degrees(moves[name])}
+    columns = np.column_stack([time_s, *(size * swings for size in moved.values())])
+    record = Record(("time_s", *moved), columns)
+    with pytest.raises(InputError, match=rf"r: {name}: reaches .* degrees\?"):
+        check_record(rig, record, "column", "r")
+    small = np.column_stack([time_s, *(size * swings for size in moves.values())])
+    check_record(rig, replace(record, data=small), "column", "r")
 
 
 def test_effects_are_data_that_leave_the_hosts_values_as_they_are() -> None:
