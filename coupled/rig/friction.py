@@ -282,9 +282,9 @@ def presliding_speed(
     from the solution with the initial slope, converges to u from one side.
     """
     stiffness, compliance, share = p.stiffness, p.compliance, p.elastic_share
-    level = _slipping(p, load, v, stribeck_factor(p, v) if p.breakaway > p.running else 0.0)
     free = inertia * v + push - stiffness * bent
     side = 1.0 if free > 0.0 else -1.0
+    level = _slipping(p, load, side, stribeck_factor(p, v) if p.breakaway > p.running else 0.0)
     faded = FADED * p.stribeck_rate
     if level - side * stiffness * bent <= SLIPS_ALL * level and (
         p.breakaway <= p.running or abs(v) > faded

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from coupled.rig.friction import (
     FADED,
     SLIPS_ALL,
+    added_friction,
     presliding_speed,
     reached,
     running_friction,
@@ -91,21 +92,27 @@ def test_a_closed_loop_loses_what_its_branches_enclose(amplitude: float) -> None
     st.floats(-300.0, 300.0),
     st.sampled_from([5e-4, 1e-3]),
     st.sampled_from([0.0, 3.0]),
+    st.sampled_from([0.0, 20.0]),
 )
-@example(1.0, 0.2, 30.0, 5e-4, 0.0)  # all of it slips, and goes on
-@example(1.0 - 0.5 * SLIPS_ALL, 0.2, 30.0, 5e-4, 3.0)
-@example(-1.0, 0.01, -10.0, 1e-3, 3.0)  # turned about
-@example(1.0, 0.0, 53.0, 5e-4, 3.0)  # from its breakaway
+@example(1.0, 0.2, 30.0, 5e-4, 0.0, 0.0)  # all of it slips, and goes on
+@example(1.0 - 0.5 * SLIPS_ALL, 0.2, 30.0, 5e-4, 3.0, 0.0)
+@example(-1.0, 0.01, -10.0, 1e-3, 3.0, 0.0)  # turned about
+@example(1.0, 0.0, 53.0, 5e-4, 3.0, 0.0)  # from its breakaway
+@example(-1.0, 1e-4, -60.0, 1e-3, 0.0, 20.0)  # turned about twice, more friction one way
 def test_a_steps_speed_balances_its_forces(
-    bent: float, rate: float, push_N: float, span: float, more_N: float
+    bent: float, rate: float, push_N: float, span: float, more_N: float, forward_N: float
 ) -> None:
     """inertia·(u − v) and the contact's mean force over the way make up the push, at any speed."""
-    breakaway = {"breakaway_N": FRICTION_N + more_N} if more_N else {}
-    p = pack(bench({**YIELDS, **breakaway}))[0]["parameters"]["friction"]
+    levels = {"breakaway_N": FRICTION_N + more_N} if more_N else {}
+    p = pack(bench({**YIELDS, **levels, "friction_push_N": forward_N}))[0]["parameters"]["friction"]
     inertia = 2.0 * 4.0 / span
-    start = bent * float(running_friction(p, rate)) / STIFFNESS
+
+    def level(rate: float, way: float) -> float:
+        return float(running_friction(p, rate) + added_friction(p, 0.0, way))
+
+    start = bent * level(rate, bent) / STIFFNESS
     u, after = presliding_speed(p, start, rate, push_N, inertia, span, 0.0)
-    ends, mean = yielded(p, running_friction(p, u), start, u * span)
+    ends, mean = yielded(p, level(u, u), start, u * span)
     fading = math.exp(-((u / p["stribeck_rate"]) ** 2))
     force = STIFFNESS * mean + p["contact_damping"] * fading * (ends - start) / span
     speeds = abs(u) + abs(rate)

@@ -28,9 +28,9 @@ from coupled.gap.search.case import Case
 from coupled.gap.search.descent import Descent
 from coupled.gap.search.evidence import Evidence, evidence, fewest_unexplained
 from coupled.gap.search.found import Candidate, Choice, Fit, Found
-from coupled.gap.search.problem import EXACT, ModelError, Problem
+from coupled.gap.search.problem import ModelError, Problem
 from coupled.gap.search.screen import Screen, Screened, Worth
-from coupled.gap.signals.output import explained_below, stage_gaps, stage_limits
+from coupled.gap.signals.output import stage_gaps, stage_limits
 from coupled.gap.thresholds import (
     BEAM_CANDIDATES,
     BEAM_DEPTH,
@@ -227,14 +227,9 @@ class Beam:
         )
 
     def unexplained(self, gaps: Mapping[str, float]) -> set[str]:
-        """Return the outputs whose gap exceeds that of the noise and the model error."""
-        case = self.problem.case
-        first, limits = case.gaps(self.without_effects.rig), stage_limits(case.outputs)
-        explained = {
-            at: limit if at in EXACT else explained_below(first[at], limit)
-            for at, limit in limits.items()
-        }
-        return {at for at, gap in gaps.items() if gap > explained[at]}
+        """Return the outputs whose gap exceeds that of noise alone."""
+        limits = stage_limits(self.problem.case.outputs)
+        return {at for at, gap in gaps.items() if gap > limits[at]}
 
 
 def relief_of(fitted: Fit) -> float:

@@ -22,7 +22,8 @@ evidence, and q_o is at least 1.
 The last term is the Laplace approximation of the ratio of posterior to prior volume. The prior of a
 size is uniform in its logarithm over Λ = ln 10⁴, so s = |θ̂ − θ₀|·Λ/√(2π), with the neutral value
 θ₀; the size is taken as at least its standard error. The evidence is then independent of the unit.
-The prior of a nuisance parameter is Gaussian, or uniform between its bounds.
+Sizes of one effect that may each be zero, such as friction by direction, have the width of their
+largest. The prior of a nuisance parameter is Gaussian, or uniform between its bounds.
 
 τ_n is the integrated autocorrelation time of the smallest residual of output o in any set, and at
 least that of the noise floor, where samples of its error are known (`Output.samples`). It is the
@@ -111,24 +112,27 @@ def _laplace(problem: Problem, members: Sequence[Effect], group: Group) -> float
     """Return the Laplace term of the parameters of one group."""
     if not group.values or not group.low:
         return 0.0
-    numbers = {one.value_key(p): p for one in members for p in one.free}
-    width = np.array([_width(problem, numbers[key], group, key) for key in group.values])
+    owners = {one.value_key(p): (one, p) for one in members for p in one.free}
+    width = np.array([_width(problem, *owners[key], group) for key in group.values])
     scaled = group.information * np.outer(width, width)
     _, logarithm = np.linalg.slogdet(np.eye(len(width)) + scaled)
     return -0.5 * float(logarithm)
 
 
-def _width(problem: Problem, p: Parameter, group: Group, key: str) -> float:
+def _width(problem: Problem, effect: Effect, p: Parameter, group: Group) -> float:
     """Return the width s of a parameter's prior at its fitted value, in its unit."""
-    prior = problem.priors.get(key)
-    if prior is not None:
+    key, case = effect.value_key(p), problem.case
+    if (prior := problem.priors.get(key)) is not None:
         return prior.sigma
-    case = problem.case
     low, high = p.bounds(case.nominal, case.control)
     flat = (high - low) / math.sqrt(2.0 * math.pi)
-    if p.may_end:
+    sides = [q for q in effect.free if q.may_end and q.mode == "added"]
+    if p.may_end and p not in sides:
         return flat
-    size = p.size(group.values[key], case.nominal, case.control)
+    size = max(
+        q.size(group.values[effect.value_key(q)], case.nominal, case.control)
+        for q in (sides if p in sides else [p])
+    )
     error = 0.5 * (group.high[key] - group.low[key]) / NORMAL_95
     size = min(max(size, error), flat) if math.isfinite(error) else flat
     return size * PRIOR_SPAN / math.sqrt(2.0 * math.pi)
