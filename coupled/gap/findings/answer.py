@@ -25,7 +25,15 @@ from coupled.gap.search.found import Choice, Found
 from coupled.gap.search.histories import course_in
 from coupled.gap.signals.output import Output
 from coupled.gap.stages.stages import Reader
-from coupled.gap.thresholds import CERTAIN, MOST, NEGLIGIBLE, STATED_MOST, SURE, UNDERSTATED
+from coupled.gap.thresholds import (
+    CERTAIN,
+    MOST,
+    NEGLIGIBLE,
+    NORMAL_95,
+    STATED_MOST,
+    SURE,
+    UNDERSTATED,
+)
 from coupled.record.channels import ControlName, unit_of
 from coupled.rig.rig import Rig
 
@@ -175,9 +183,10 @@ def _estimate(
     # The covariance includes noise and misfit, but not that the fit may stop off the optimum.
     low = value - UNDERSTATED * (value - fit.low[key])
     high = value + UNDERSTATED * (fit.high[key] - value)
-    if scatter > 0.0:  # sampling error of a random quantity
-        low = max(value - math.hypot(value - low, 1.96 * scatter * value), p.low)
-        high = value + math.hypot(high - value, 1.96 * scatter * value)
+    if scatter > 0.0:  # sampling error of a random quantity, which is positive: a factor
+        times = math.exp(NORMAL_95 * scatter)
+        low = max(value - math.hypot(value - low, value - value / times), p.low)
+        high = value + math.hypot(high - value, times * value - value)
     twin = other_side(value, case.nominal.frame_rate) if p.kind == "aliased" else None
     if twin is not None:  # aliased: the tone may lie on either side of the Nyquist frequency
         low, high = min(low, twin - (value - low)), max(high, twin + (high - value))
