@@ -129,8 +129,6 @@ RULES = (
          "a filed friction raises the loader's limit by 3 % of its gap", fresh=True),
     Rule("exact_laws", "search.problem:EXACT", (),
          "schedule, compensation and linkage have no model error in the evidence"),
-    Rule("exact_open", "search.beam:EXACT", (),
-         "an exact stage is explained only within its limit"),
     Rule("onset", "search.histories:_search_with_onset", gives(None),
          "the search is repeated with an effect that begins within the record"),
     Rule("noise_passed", "search.case:Case.gaps",

@@ -38,10 +38,12 @@ from coupled.gap.thresholds import (
     PARTLY,
     RIVAL_GAIN,
     SHORT_FRAMES,
+    SMALL,
     TRIM_ANSWERED,
     TRIM_SIGMAS,
     BRIEF_s,
     FLIGHT_s,
+    STANDING_s,
     TRIM_LAGS_s,
 )
 from coupled.record.channels import ControlName, channel
@@ -105,33 +107,41 @@ def _standing_off(rig: Rig, record: Record, control: ControlName) -> tuple[float
     """Return a surface's initial offset from trim and command, and its standard error, rad.
 
     Shortfall and lag behind the command are fitted too; if the command moves at once, they would
-    imitate another trim. None if the record does not have the command.
+    imitate another trim. The offset is that of the longest time in which they leave noise, since
+    play or a dead zone leaves more; else of the shortest. None without the command in the record.
     """
     name, pressure = channel(control, "estimate"), "dynamic_pressure_Pa"
     points = surface_points(rig, control)
     if name not in record or pressure not in record or points is None:
         return None
-    rows = max(2, round(BRIEF_s * rig.frame_rate))
     served = service_rows(record, control)
     wanted = record[name] if served is None else served.asked
-    asked = replay_surface(rig, control, wanted[:rows], record[pressure][:rows])
-    asked = asked + trim_shift(record, control, 1.0 / rig.frame_rate)[:rows]
     measured = record[surface_channel(control)]
     held = about(own_trim(rig, control), filed_trim(rig, control), points)
-    left = measured[1:rows] - np.interp(held + asked[: rows - 1], *points)
     noise = estimate_noise(measured)
     crowded = (1.0 + noise.memory) / (1.0 - noise.memory)  # variance of a mean, over white noise's
-    smooth = np.interp(held + smoothed(asked)[: rows - 1], *points)
-    return _constant(left, smooth - np.interp(held, *points), noise.rms * math.sqrt(crowded))
+    error = noise.rms * math.sqrt(crowded)
+    found = 0.0, math.inf
+    for time_s in STANDING_s:
+        rows = max(2, round(time_s * rig.frame_rate))
+        asked = replay_surface(rig, control, wanted[:rows], record[pressure][:rows])
+        asked = asked + trim_shift(record, control, 1.0 / rig.frame_rate)[:rows]
+        left = measured[1:rows] - np.interp(held + asked[:-1], *points)
+        moved_by = np.interp(held + smoothed(asked)[:-1], *points) - np.interp(held, *points)
+        found, leaves = _constant(left, moved_by, error)
+        if leaves <= (1.0 + SMALL) * error:
+            break
+    return found
 
 
-def _constant(left: Floats, ordered: Floats, noise: float) -> tuple[float, float]:
-    """Return the constant part of a surface's deviation, rad, and its standard error.
+def _constant(left: Floats, ordered: Floats, noise: float) -> tuple[tuple[float, float], float]:
+    """Return the constant part of a surface's deviation with its standard error, and what is left.
 
-    `ordered` is the motion by the command. A share of it and of its rate are fitted beside the
-    constant. If they do not improve the fit and the constant is significant, it is estimated by
-    the mean, which is more precise. It is significant in that fit, or from the rows before the
-    command has moved the surface by a quarter of it, since a lag is no larger than its command.
+    All in rad, the last as rms. `ordered` is the motion by the command. A share of it and of its
+    rate are fitted beside the constant. If they do not improve the fit and the constant is
+    significant, it is estimated by the mean, which is more precise. It is significant in that fit,
+    or from the rows before the command has moved the surface by a quarter of it, since a lag is no
+    larger than its command.
     """
     answers = np.column_stack([ordered, np.gradient(ordered)])
     answers /= np.maximum(np.linalg.norm(answers, axis=0), 1e-300)
@@ -143,15 +153,16 @@ def _constant(left: Floats, ordered: Floats, noise: float) -> tuple[float, float
     count = max(1, int(still.sum()))
     at_once = abs(float(np.sum(left[still]))) > TRIM_SIGMAS * noise * math.sqrt(count)
     if known < 1e-9 * len(left):
-        return mean, alone if at_once else abs(mean) + alone
+        return (mean, alone if at_once else abs(mean) + alone), float(np.std(left))
     found, error = float(apart @ left) / known, noise / math.sqrt(known)
-    if not at_once and abs(found) <= TRIM_SIGMAS * error:
-        return found, error
     rest = left - found
     rest -= answers @ np.linalg.lstsq(answers, rest)[0]
+    leaves = math.sqrt(float(np.mean(rest**2)))
+    if not at_once and abs(found) <= TRIM_SIGMAS * error:
+        return (found, error), leaves
     if float(np.sum((left - mean) ** 2) - rest @ rest) < TRIM_ANSWERED * noise**2:
-        return mean, alone
-    return found, error
+        return (mean, alone), leaves
+    return (found, error), leaves
 
 
 def _followed(
