@@ -141,12 +141,21 @@ def test_a_model_in_its_own_trim_stays_there_by_surfaces_that_do_not_move(rig: R
     [
         ({}, False),
         ({"mass": {"factor": 1.1}}, True),
+        ({"mass": {"factor": 1.006}}, True),  # the trim moves by two thirds of the noise
         ({"pitch_stiffness": {"factor": 0.8}}, True),
         ({"rigging_offset": {"offset_norm": 0.001}}, False),
         ({"rigging_offset": {"offset_norm": 0.02}}, False),
         ({"mass": {"factor": 1.1}, "rigging_offset": {"offset_norm": -0.03}}, True),
     ],
-    ids=["as filed", "mass", "stiffness", "small offset", "offset", "mass and offset"],
+    ids=[
+        "as filed",
+        "mass",
+        "small mass",
+        "stiffness",
+        "small offset",
+        "offset",
+        "mass and offset",
+    ],
 )
 def test_a_trim_is_distinguished_from_an_offset(
     tmp_path: Path, rig: Rig, values: dict[str, dict[str, float]], elsewhere: bool
@@ -178,7 +187,7 @@ def test_what_a_surface_lacks_of_its_command_is_no_other_trim(
     assert found is not None
     own = own_trim(rig, "column")
     assert (found.position, found.jump) == (own, 0.0)
-    assert abs(found.measured - own) < 2.0 * found.error < 2e-4
+    assert abs(found.measured - own) < 3.0 * found.error < 3e-4
 
 
 @pytest.mark.parametrize(
@@ -193,7 +202,7 @@ def test_what_stands_before_the_command_has_moved_is_a_trim(
     ordered = rate * time
     late = -rate * lag_s * -np.expm1(-time / max(lag_s, 1e-9))
     left = off_rad + late + np.random.default_rng(9).normal(0.0, noise, len(time))
-    found, error = _constant(left, ordered, noise)
+    (found, error), _ = _constant(left, ordered, noise)
     assert (abs(found) > 4.0 * error) is sure
     if sure:
         assert (found, error) == pytest.approx((off_rad, noise / len(time) ** 0.5), rel=0.02)
@@ -204,7 +213,7 @@ def test_the_trim_is_an_output_that_the_right_model_meets(tmp_path: Path, rig: R
     (output,) = [out for out in airframe_outputs(rig, record) if out.channel == TRIM]
     heavy = real(rig, "mass", 1.1)
     assert output.gap(rig) > 1.5
-    assert output.gap(heavy) < 0.3
+    assert output.gap(heavy) < 0.5
     assert heavy.flight is not None
     aircraft = make_aircraft(heavy.flight, 1.0 / rig.frame_rate)
     assert np.all(output.predict(heavy) == aircraft.motion()[ELEVATOR])
