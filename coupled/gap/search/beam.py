@@ -8,10 +8,10 @@ has a log evidence (`evidence`). At each depth the neighbours of the best sets a
     swap      an effect for another effect of the same output
     drop      one effect less
 
-The search ends when every stage is explained or no set is new. A fit of a neighbour starts from its
-parent's optimum, with the new parameters at a few sizes. The presliding parameters of dry friction
-start from a grid search; laws of friction are also started from a fit by multiple shooting. All
-starts are fitted for a few evaluations, and those far behind the best are dropped.
+The search ends when every stage is within its noise or no set is new. A fit of a neighbour starts
+from its parent's optimum, with the new parameters at a few sizes. The presliding parameters of dry
+friction start from a grid search; laws of friction are also started from a fit by multiple
+shooting. All starts are fitted for a few evaluations, and those far behind the best are dropped.
 """
 
 from __future__ import annotations
@@ -211,7 +211,7 @@ class Beam:
         return max(self.log(self.best) - self.log_of(fitted), 0.0)
 
     def open_outputs(self, names: Names) -> set[str]:
-        """Return the outputs whose residual exceeds the noise and the model error with a set.
+        """Return the outputs whose residual exceeds the noise with a set.
 
         If the prior penalty of its nuisance parameters would pay for an effect, these may have
         absorbed one: the residual is then that within their tolerance.
