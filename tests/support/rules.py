@@ -135,7 +135,7 @@ RULES = (
          lambda original, case, rig: stage_gaps(case.outputs, rig),
          "a gap counts by the higher noise floor of the filed rig and this one"),
     Rule("stated_most", "findings.answer:STATED_MOST", 1.0,
-         "no probability above 0.88"),
+         "no probability above 0.89"),
     Rule("sure", "findings.answer:SURE", 1.0, "a credible effect's posterior times 0.97"),
     Rule("neutral_cap", "findings.answer:has_size", gives(True),
          "below certain where the interval includes neutral"),
