@@ -168,6 +168,7 @@ def test_a_trim_is_distinguished_from_an_offset(
         name, numbers = next(iter(values.items()))
         place = own_trim(real(rig, name, numbers["factor"]), "column")
     assert found.position == pytest.approx(place, abs=1e-9 if not elsewhere else 4 * found.error)
+    assert (found.position != own_trim(rig, "column")) is elsewhere
     assert (found.jump != 0.0) is ("rigging_offset" in values)
 
 
