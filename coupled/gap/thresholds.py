@@ -40,8 +40,8 @@ SHORT_FRAMES = 12  # step: a tenth of a second at 120 Hz, before a motion change
 FEW_FRAMES = 8  # step: in which a motion may be straight, or a rest begins; chosen
 BRIEF_s, FLIGHT_s = 1.0, 15.0  # step: of a trim at a record's start; of a test flight. With 15 s
 # the offset of 26 records of a T-37 was decided right; longer, the phugoid's own error decided
-STANDING_s = (8.0, 4.0, 2.0, BRIEF_s)  # step: of an offset there; of 320 records the first changed
-# one answer, a lift slope of 1 % that was held for an offset of the surface
+STANDING_s = (8.0, 4.0, 2.0, BRIEF_s)  # step: of an offset there. Without the first three, of 320
+# records a lift slope and a pitch stiffness of 1 and 2 % were not found, or with a false offset
 
 # Live records (`live`).
 BRIDGED_s = 0.025  # step: three frames at 120 Hz represent 15 Hz; a hand moves below 5 Hz

@@ -30,7 +30,7 @@ from coupled.gap.search.evidence import Evidence, evidence, fewest_unexplained
 from coupled.gap.search.found import Candidate, Choice, Fit, Found
 from coupled.gap.search.problem import ModelError, Problem
 from coupled.gap.search.screen import Screen, Screened, Worth
-from coupled.gap.signals.output import stage_gaps, stage_limits
+from coupled.gap.signals.output import stage_limits
 from coupled.gap.thresholds import (
     BEAM_CANDIDATES,
     BEAM_DEPTH,
@@ -216,20 +216,13 @@ class Beam:
         If the prior penalty of its nuisance parameters would pay for an effect, these may have
         absorbed one: the residual is then that within their tolerance.
         """
-        case, fitted = self.problem.case, self.fits[names]
+        problem, fitted = self.problem, self.fits[names]
         if relief_of(fitted) > PRIOR_EFFECT:
-            return self.unexplained(
-                stage_gaps(case.outputs, self.problem.within_tolerance(fitted).rig)
-            )
-        rig = fitted.rig
-        return self.unexplained(
-            case.gaps(rig) if names == self.best else stage_gaps(case.outputs, rig)
-        )
-
-    def unexplained(self, gaps: Mapping[str, float]) -> set[str]:
-        """Return the outputs whose gap exceeds that of noise alone."""
-        limits = stage_limits(self.problem.case.outputs)
-        return {at for at, gap in gaps.items() if gap > limits[at]}
+            return problem.over_limit(problem.within_tolerance(fitted).rig)
+        if names != self.best:
+            return problem.over_limit(fitted.rig)
+        limits = stage_limits(problem.outputs)
+        return {at for at, gap in problem.case.gaps(fitted.rig).items() if gap > limits[at]}
 
 
 def relief_of(fitted: Fit) -> float:
@@ -281,7 +274,7 @@ def _search_from(
     """
     without_effects, case = problem.within_tolerance(known[0]), problem.case
     beam = Beam(problem, without_effects, problem.model_error(without_effects.rig))
-    over = beam.unexplained(stage_gaps(case.outputs, without_effects.rig))
+    over = problem.over_limit(without_effects.rig)
     for fitted in (without_effects if over else known[0], *known[1:]):
         beam.add(fitted)
     beam.recount()
@@ -438,8 +431,7 @@ def _fit_neighbours(beam: Beam, fitted: Fit, library: Sequence[Effect], wanted: 
 def _fit_by_multiple_shooting(beam: Beam) -> None:
     """Restart sets with dry friction from multiple shooting, if the loader is unexplained."""
     short, best = beam.problem.by_shots, beam.fits[beam.best]
-    left = stage_gaps(beam.problem.outputs, best.rig)
-    if short is None or "loader" not in beam.unexplained(left):
+    if short is None or "loader" not in beam.problem.over_limit(best.rig):
         return
     most = beam.log(beam.best)
     dry = [
