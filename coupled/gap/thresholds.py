@@ -186,6 +186,7 @@ BEAM_CANDIDATES = 8  # step: effects fitted beside the best set; ablated
 GIVEN_UP = 30.0  # step: log evidence behind the best, at which a start or a set is dropped
 BEAM_SIZES = (0.03, 0.3, 1.0, 5.0)  # step: times the start of a parameter, for signatures; ablated
 BEAM_FACTORS = (-2.0, 0.5, 1.0, 5.0)  # step: the same for the difference of a factor from 1; chosen
+FURTHER = 5.0  # step: as from the third size to the fourth, while a larger effect leaves less
 PRIOR_EFFECT = 4.0  # −ln of an effect's prior probability: one of some 72, about equally likely
 PRIOR_NUMBER = 1.0  # −ln of the prior of a law by each parameter beyond the first; ablated
 PRIOR_SPAN = 9.2  # prior: ln 10⁴; over four decades a size is equally likely in each

@@ -23,7 +23,7 @@ from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points
 from coupled.gap.thresholds import RIVAL_GAIN, VERY_STRONG
 from coupled.rig.rig import Rig
-from tests.support.gaps import made, nominal_rig
+from tests.support.gaps import made, nominal_rig, starts_of
 from tests.support.rigs import bench
 
 Floats = NDArray[np.float64]
@@ -307,6 +307,33 @@ def test_of_laws_that_contain_one_another_the_one_that_is_there_is_named(
     # Where F drives the machine, a contact that yields is a bend, and is not tried (`prepare`).
     library = [e for e in EFFECTS if e.stage == "linkage" and e.name != "yielding_contact"]
     assert names(search_sets(case, library)[1]) == {name}
+
+
+LIGHT = {"bend_{d}_per_N": 1e-4, "damping_ratio": 0.04}
+
+
+@pytest.mark.parametrize("frequency_Hz", [0.7, 14.0])
+def test_a_fit_of_a_lightly_damped_mode_starts_within_its_bandwidth(frequency_Hz: float) -> None:
+    values = LIGHT | {"frequency_Hz": frequency_Hz}
+    case = stage_of_record("linkage", "structural_mode", tuple(values.items()), 31)
+    (start,) = starts_of(case, BY_NAME["structural_mode"])
+    bandwidth_Hz = 2.0 * LIGHT["damping_ratio"] * frequency_Hz
+    assert start["structural_mode.frequency_Hz"] == pytest.approx(frequency_Hz, abs=bandwidth_Hz)
+    assert start["structural_mode.bend_{d}_per_N"] == pytest.approx(1e-4, rel=0.3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("frequency_Hz", [0.7, 1.5, 14.0])
+def test_a_lightly_damped_mode_of_any_frequency_is_named(frequency_Hz: float) -> None:
+    """From 8 Hz, 0.7 and 1.5 Hz led to no effect, and 14 Hz to a mode of 24 Hz."""
+    values = LIGHT | {"frequency_Hz": frequency_Hz}
+    case = stage_of_record("linkage", "structural_mode", tuple(values.items()), 31)
+    library = [e for e in EFFECTS if e.stage == "linkage" and e.name != "yielding_contact"]
+    choice = search_sets(case, library)[1]
+    assert names(choice) == {"structural_mode"}
+    assert choice.fit.values["structural_mode.frequency_Hz"] == pytest.approx(
+        frequency_Hz, rel=0.01
+    )
 
 
 @pytest.mark.slow

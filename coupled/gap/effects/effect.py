@@ -87,6 +87,11 @@ class Parameter:
         return self.role == "size"
 
     @property
+    def has_neutral(self) -> bool:
+        """Whether the effect is absent only if this value is neutral."""
+        return self.is_size or self.mode == "factor"
+
+    @property
     def is_limit(self) -> bool:
         """Whether a smaller value has a larger effect."""
         return self.kind == "limit"

@@ -17,6 +17,7 @@ from coupled.gap.effects.effect import (
     switch,
     value,
 )
+from coupled.gap.effects.seen import MODES_Hz, modes
 from coupled.gap.thresholds import SETTING, YIELDING_ERROR
 
 SERVO = "loader.servo_frequency_Hz"
@@ -84,12 +85,13 @@ LINKAGE: tuple[Effect, ...] = (
         "linkage",
         (
             _BEND_BESIDE,
-            limit("frequency_Hz", "loader.bend_frequency_Hz", 0.5, 200, 8.0),
+            limit("frequency_Hz", "loader.bend_frequency_Hz", *MODES_Hz, 8.0),
             value(
                 "damping_ratio", "loader.bend_damping_ratio", 0, 2, 0.05, role="other", may_end=True
             ),
         ),
         Signature("force", "bent", "loop", 1.5),
+        seen=modes,
         contains=("bend",),
     ),
     one(

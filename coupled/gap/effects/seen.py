@@ -1,9 +1,13 @@
-"""Start values of effects, estimated from the residuals: hums, ripples and stops.
+"""Start values of effects, estimated from the residuals: hums, ripples, stops and modes.
 
 A ripple is a force proportional to sin or cos of 2π·δc/period. It moves δc by the loader's
 equation, m·r'' + c·r' + G·r = −F. The residual is regressed on this response for many periods, as
 in a spectrum over the deflection instead of time. The regression is in δc, where the noise is
 white; in the force, the equation would amplify noise at short periods.
+
+The bend of a lightly damped structure is linear in its coefficient, but nearly all of it is within
+its bandwidth, a share 2ζ of its frequency. The residual of a rigid structure is therefore regressed
+on the bend at frequencies that are one bandwidth apart.
 """
 
 from __future__ import annotations
@@ -19,22 +23,25 @@ from coupled.gap.noise.lines import lines_in, tone_of
 from coupled.gap.noise.smooth import smoothed
 from coupled.gap.signals.output import Floats, Output
 from coupled.gap.thresholds import FEW, MORE, RIPPLE_PERIODS, TRIES
-from coupled.record.channels import ControlName, channel
-from coupled.rig.rig import Rig
+from coupled.record.channels import ControlName, channel, unit_of
+from coupled.rig.rig import Rig, with_values
 
 Complex = NDArray[np.complex128]
+HUM_Hz = 5.0  # the slowest hum, or alias of one
 
 
 def hums(outputs: Sequence[Output], rig: Rig, control: ControlName) -> list[dict[str, float]]:
     """Return amplitude, d, frequency, Hz, and phase, rad, of the strongest hum, if there is one.
 
-    Only the first record is used: the phase differs between records (`reading`).
+    Only the first record is used: the phase differs between records (`reading`). A tone of mains
+    may have an alias at any frequency.
     """
     ours = [output for output in outputs if output.stage == "loader"]
     if not ours:
         return []
     first = ours[0]
-    for line in lines_in(first.residual(rig) * first.floor):
+    slowest = 2.0 * math.pi * HUM_Hz / first.frame_rate_Hz
+    for line in lines_in(first.residual(rig) * first.floor, slowest):
         seen_Hz = line.turn * first.frame_rate_Hz / (2.0 * math.pi)
         tone_Hz = tone_of(seen_Hz, first.frame_rate_Hz)
         turns = tone_Hz / first.frame_rate_Hz * 2.0 * math.pi
@@ -136,3 +143,36 @@ def _met(output: Output, rig: Rig, side: float) -> float | None:
     if furthest <= 0.0 or not held.any():
         return None
     return max(float(np.median(measured[held])), 0.0) or None
+
+
+LIGHT = 0.05  # damping ratio of the modes that are tried; the fit starts there
+MODES_Hz = (0.5, 200.0)  # the slowest and fastest mode of a structure
+BEND = 1e-6  # d/N, of the modes that are tried; any will do, since the bend is linear in it
+
+
+def modes(outputs: Sequence[Output], rig: Rig, control: ControlName) -> list[dict[str, float]]:
+    """Return bend, d/N, frequency, Hz, and damping ratio of the mode that takes most of a residual.
+
+    Return none if no mode takes anything of it, such as without a force.
+    """
+    ours = [output for output in outputs if output.stage == "linkage"]
+    d = unit_of(control)
+    keys = [f"bend_{d}_per_N", "bend_frequency_Hz", "bend_damping_ratio"]
+
+    def left(*values: float) -> Floats:
+        paths = (f"controls.{control}.loader.{key}" for key in keys)
+        bent = with_values(rig, dict(zip(paths, values, strict=True)))
+        return np.concatenate([output.residual(bent, coarse=True) for output in ours])
+
+    rigid = left(0.0, 0.0, 0.0) if ours else np.zeros(0)
+    fastest_Hz = min([MODES_Hz[1], *(0.5 * output.frame_rate_Hz for output in ours)])
+    apart = math.log(1.0 + 2.0 * LIGHT)
+    found, most = list[dict[str, float]](), 0.0
+    for rate in np.arange(math.log(MODES_Hz[0]), math.log(fastest_Hz), apart) if ours else ():
+        frequency_Hz = math.exp(rate)
+        bent = (rigid - left(BEND, frequency_Hz, LIGHT)) / BEND
+        power, along = float(bent @ bent), float(bent @ rigid)
+        if along > most * math.sqrt(power):
+            most, bend = along / math.sqrt(power), along / power
+            found = [{"bend_{d}_per_N": bend, "frequency_Hz": frequency_Hz, "damping_ratio": LIGHT}]
+    return found

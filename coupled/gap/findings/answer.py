@@ -33,6 +33,7 @@ from coupled.gap.thresholds import (
     STATED_MOST,
     SURE,
     UNDERSTATED,
+    VERY_STRONG,
 )
 from coupled.record.channels import ControlName, unit_of
 from coupled.rig.rig import Rig
@@ -145,7 +146,8 @@ def effects_of(
 
     The probability of an effect falls with its credibility. It is at most `STATED_MOST`, the share
     of correct effects among the most probable ones, and just below `CERTAIN` if the interval
-    of its size contains the neutral value.
+    of its size contains the neutral value. Several values that a record cannot separate may each
+    have such an interval, although they are not all neutral: then the evidence decides.
     """
     remains = {stage.name: stage.remainder for stage in stages}
     records = [reader.record for reader in readers]
@@ -156,7 +158,9 @@ def effects_of(
         known = credibility(effect, case, choice.fit, records, beside)
         scatter = _sample_error(effect, readers)
         numbers = tuple(_estimate(choice, effect, p, case, scatter) for p in effect.free)
-        most = STATED_MOST if has_size(effect, case, numbers) else (CERTAIN - NEGLIGIBLE)
+        together = sum(p.has_neutral for p in effect.free) > 1 and step.gain > VERY_STRONG
+        sized = together or has_size(effect, case, numbers)
+        most = STATED_MOST if sized else (CERTAIN - NEGLIGIBLE)
         probability = min(step.probability * SURE * known.value, most)
         course = course_in(effect, case, choice.fit, records)
         given = (effect.name, effect.stage, probability, numbers, known, course)
@@ -166,8 +170,8 @@ def effects_of(
 
 
 def has_size(effect: Effect, case: Case, numbers: Sequence[ParameterEstimate]) -> bool:
-    """Tell whether a size of an effect differs from its neutral value; a limit always does."""
-    sizes = [(p, one) for p, one in zip(effect.free, numbers, strict=True) if p.is_size]
+    """Tell whether a value of an effect differs from its neutral value; a limit always does."""
+    sizes = [(p, one) for p, one in zip(effect.free, numbers, strict=True) if p.has_neutral]
     for p, one in sizes:
         none, low, high = p.neutral(case.nominal, case.control), one.low, one.high
         if p.is_limit or not (low is None or low <= none) or not (high is None or none <= high):

@@ -1,8 +1,8 @@
 """Lines in a spectrum: tones, such as mains hum, above a channel's noise.
 
 A line is a bin of the tapered spectrum far above its surroundings which one sine removes almost
-completely; a resonance or a sweep is broader. Lines are searched above 0.4 of the Nyquist
-frequency, where a channel contains noise alone (`noise`).
+completely; a resonance or a sweep is broader. In a channel lines are searched above 0.4 of the
+Nyquist frequency, where it contains noise alone (`noise`).
 
 By aliasing a tone of f appears at |f − n·rate|: 60 Hz logged at 100 Hz appears at 40 Hz. Mains have
 50 or 60 Hz, on aircraft 400 Hz. A line at an alias of one of these is attributed to it.
@@ -70,12 +70,12 @@ class SeenLine:
         }
 
 
-def lines_in(signal: Floats) -> list[Line]:
-    """Return the lines of a signal, the most significant first; shape (frames,)."""
+def lines_in(signal: Floats, lowest: float = NOISE_FROM * math.pi) -> list[Line]:
+    """Return the lines of a signal above `lowest`, rad a frame, the most significant first."""
     found: list[Line] = []
     left = signal
     while len(signal) >= WHITE_FRAMES and len(found) < ROUNDS:
-        turn = _highest(left)
+        turn = _highest(left, lowest)
         if turn is None:
             return found
         line = _sharpened(left, turn)
@@ -140,12 +140,12 @@ def projected(signal: Floats, turn: float) -> Line:
     return Line(turn, float(np.hypot(sine, cosine)), float(np.arctan2(cosine, sine)))
 
 
-def _highest(signal: Floats) -> float | None:
+def _highest(signal: Floats, lowest: float) -> float | None:
     """Return the frequency of the bin highest above its surroundings; None if none is a line."""
     rough = np.diff(signal, 4)
     power = np.abs(np.fft.rfft(rough * np.hanning(len(rough)))) ** 2
     omega = np.linspace(0.0, math.pi, len(power))
-    first = int(np.searchsorted(omega, NOISE_FROM * math.pi))
+    first = int(np.searchsorted(omega, lowest))
     power = power[first:] / (2.0 * np.sin(0.5 * omega[first:])) ** 8
     parts = np.array_split(power, PIECE // 4)
     level = np.concatenate([np.full(len(p), np.median(p) / math.log(2.0)) for p in parts])

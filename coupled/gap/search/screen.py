@@ -35,6 +35,7 @@ from coupled.gap.thresholds import (
     BEAM_CANDIDATES,
     BEAM_FACTORS,
     BEAM_SIZES,
+    FURTHER,
     LIMIT_BISECTIONS,
     LIMIT_SHARES,
     NEGLIGIBLE,
@@ -230,17 +231,29 @@ class Screen:
         apart, what the trim has left of the accelerations jumps.
         """
         now = _residual(self.problem, effect, current.rig)
-        part = SMALL if STAGE_OF[effect.stage].flown and effect.seen is None else 1.0
-        found = []
+        flown = STAGE_OF[effect.stage].flown
+        part = SMALL if flown and effect.seen is None else 1.0
+
+        def made(values: Values, shape: int) -> list[_Signature]:
+            go_on()
+            rig = _with(self.problem, current, effect, _step(self.problem, effect, values, part))
+            if rig is None:
+                return []
+            return [_Signature(values, shape, (_residual(self.problem, effect, rig) - now) / part)]
+
+        def left(one: _Signature) -> float:
+            return float((now + one.change) @ (now + one.change))
+
+        found = list[_Signature]()
         for shape, tries in enumerate(_tries(self.problem, current, effect)):
-            for values in tries:
-                go_on()
-                rig = _with(
-                    self.problem, current, effect, _step(self.problem, effect, values, part)
-                )
-                if rig is not None:
-                    change = (_residual(self.problem, effect, rig) - now) / part
-                    found.append(_Signature(values, shape, change))
+            ours = [one for values in tries for one in made(values, shape)]
+            while ours and not flown and effect.seen is None:
+                best = min(ours, key=left)
+                further = _further(self.problem, effect, best.values, [one.values for one in ours])
+                ours += made(further, shape) if further is not None else []
+                if min(ours, key=left) is best:
+                    break
+            found += ours
         return found
 
 
@@ -320,6 +333,27 @@ def _less(problem: Problem, effect: Effect, first: Values) -> list[Values]:
                 values[effect.value_key(p)] = share * least
         found += [values] if values != first else []
     return found
+
+
+def _further(
+    problem: Problem, effect: Effect, values: Values, tried: Sequence[Values]
+) -> Values | None:
+    """Return values of a larger effect in the same direction; None if such values were tried.
+
+    The sizes are `FURTHER` times as far from their neutral values, within their bounds.
+    """
+    case, found, reached = problem.case, dict(values), [0.0]
+    for p in effect.free:
+        key, none = effect.value_key(p), p.neutral(case.nominal, case.control)
+        if not p.is_size or values[key] in (none, 0.0):
+            continue
+        far = values[key] / FURTHER if p.is_limit else none + FURTHER * (values[key] - none)
+        found[key] = float(np.clip(far, *p.bounds(case.nominal, case.control)))
+        for one in tried:
+            reached.append(
+                values[key] / one[key] if p.is_limit else (one[key] - none) / (values[key] - none)
+            )
+    return None if found == values or max(reached) > 1.0 else found
 
 
 def is_limit(effect: Effect) -> bool:

@@ -1,0 +1,46 @@
+"""Effects far from where their fits start: a large one is no less clear than a small one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from coupled.gap.diagnose import diagnose
+from tests.support.gaps import made, nominal_rig
+
+LARGE = {
+    "coulomb_friction": {"friction_N": 30.0},
+    "stribeck_friction": {"friction_N": 8.0, "breakaway_N": 24.0, "stribeck_{d}_per_s": 0.01},
+    "viscous_damping": {"factor": 4.0},
+    "modifying_lag": {"lag_s": 1.0},
+    "bend_hysteresis": {"bend_{d}_per_N": 2e-4, "share": 0.8, "width_N": 40.0},
+    "mains_hum": {"amplitude_{d}": 2e-4, "frequency_Hz": 7.0, "phase_rad": 0.4},
+    "surface_lag": {"lag_s": 1.5},
+}
+FLOWN = ("surface_lag",)
+LOOSE = {"stribeck_{d}_per_s": 0.1}  # of a wide fall of friction; the others within 3 %
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", LARGE)
+def test_a_large_effect_is_named_with_its_size(name: str, tmp_path: Path) -> None:
+    rig, true = nominal_rig(name in FLOWN), LARGE[name]
+    record = made(tmp_path, rig, {name: true}, 31)
+    (found,) = diagnose(rig, {"flown": record}, "column").effects
+    assert (found.name, found.probability > 0.8) == (name, True)
+    for one, (key, value) in zip(found.parameters, true.items(), strict=True):
+        assert one.value == pytest.approx(value, rel=LOOSE.get(key, 0.03)), key
+
+
+@pytest.mark.slow
+def test_values_that_the_record_does_not_separate_are_no_doubt_of_the_law(tmp_path: Path) -> None:
+    """Each interval of the servo's values contains the neutral value, but not all together."""
+    rig, true = nominal_rig(False), {"delay_s": 0.0, "factor": 1.3, "damping_factor": 2.0}
+    record = made(tmp_path, rig, {"servo_tuning": true}, 31)
+    found = diagnose(rig, {"flown": record}, "column")
+    assert [effect.name for effect in found.effects] == ["servo_tuning"]
+    assert found.verdict == "effect"
+    for one, value in zip(found.effects[0].parameters, true.values(), strict=True):
+        assert one.low is not None and one.high is not None
+        assert one.low <= value <= one.high
