@@ -14,7 +14,7 @@ interpolated between the rows.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -23,14 +23,14 @@ import numpy as np
 from coupled.errors import InputError, nearest
 from coupled.flight.aircraft import make_aircraft
 from coupled.flight.altered import STILL
-from coupled.gap.signals.output import Floats
-from coupled.gap.stages.airframe import RATE
+from coupled.gap.signals.output import Floats, Output
 from coupled.gap.stages.surfaces import surface_channel, surface_points
 from coupled.gap.thresholds import (
     DOUBLED,
     NEGLIGIBLE,
     OTHER_SPEED,
     PIECE,
+    REVERSED,
     SHORT_FRAMES,
     SHORT_SWINGS,
     TINY,
@@ -38,8 +38,10 @@ from coupled.gap.thresholds import (
     SHORTEST_RECORD_s,
 )
 from coupled.record.channels import (
+    CONTROL_NAMES,
     LATERAL,
     LONGITUDINAL,
+    RATE,
     TIME,
     ControlName,
     channel,
@@ -166,6 +168,21 @@ def _check_signs(rig: Rig, record: Record, control: ControlName, file: object) -
     passive = rig.controls[control].drive != "setpoint"
     if passive and force in record and plausible.drives_the_hand(record[force], record[moved[0]]):
         raise InputError(file, force, problem)
+
+
+def check_against_model(outputs: Sequence[Output], rig: Rig, files: Sequence[object]) -> None:
+    """Raise InputError if a surface, or the pitch or roll rate, moves against the model's.
+
+    No effect of the library reverses these. The yaw rate and slow motion may be reversed by one.
+    """
+    signed = (*map(surface_channel, CONTROL_NAMES), RATE["column"], RATE["wheel"])
+    for output in outputs:
+        if output.channel not in signed:
+            continue
+        predicted = output.measured - output.floor * output.residual(rig)
+        if plausible.move_oppositely(predicted, output.measured, REVERSED):
+            problem = f"moves against that of {rig.name}: is its sign reversed?"
+            raise InputError(files[output.record], output.channel, problem)
 
 
 def clipped(record: Record, control: ControlName, file: str) -> list[str]:
@@ -393,7 +410,7 @@ def motion_alone(records: Mapping[str, Record]) -> dict[str, Record]:
     """
     found = {}
     for file, record in records.items():
-        for name in (ELEVATOR, RATE):
+        for name in (ELEVATOR, RATE["column"]):
             if name not in record:
                 problem = "is missing; the rig has an aircraft only, and is judged by it"
                 raise InputError(file, name, problem)

@@ -30,6 +30,7 @@ from coupled.errors import InputError
 from coupled.gap.chain import AIRFRAME, Part
 from coupled.gap.checks import (
     at_rate_of,
+    check_against_model,
     check_moved_by_pilot,
     check_record,
     check_trim,
@@ -122,6 +123,7 @@ def prepare(
     ]
     if not outputs:
         raise InputError(next(iter(records)), "", _too_little(rig, control, judged.readers))
+    check_against_model(outputs, rig, list(records))
     left_out = [words for one in live for words in one.left_out]
     for file, record in records.items() if part.own else ():
         left_out += clipped(record, control, file)

@@ -35,6 +35,7 @@ ROUNDS, TRIES = 3, 4  # step: repeats that may improve a result; samples, or alt
 
 # Records that are refused (`checks`).
 OTHER_SPEED = 0.03  # tolerance of the trimmed airspeed; ablated
+REVERSED = -0.9  # prior: correlation with the model, below which a sign is reversed; chosen
 SHORT_FRAMES = 12  # step: a tenth of a second at 120 Hz, before a motion changes; and of set
 # points, the most frames between two and the least number; ablated
 FEW_FRAMES = 8  # step: in which a motion may be straight, or a rest begins; chosen

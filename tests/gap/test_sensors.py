@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from coupled.errors import InputError
 from coupled.gap.checks import check_record, clipped
+from coupled.gap.diagnose import diagnose
 from coupled.record.importing.plausible import drives_the_hand
 from coupled.record.record import Record
+from tests.support.gaps import made, nominal_rig
 from tests.support.rigs import bench
 
 TIME_s = np.arange(1200) / 100.0
@@ -54,3 +58,22 @@ def test_a_clipped_sensor_is_named() -> None:
     data[:, 1] = np.clip(data[:, 1], -10.0, 10.0)
     [said] = clipped(Record(NAMES, data), "column", "r.csv")
     assert "column_force_N of r.csv is clipped at 10" in said
+
+
+@pytest.fixture(scope="module")
+def flown(tmp_path_factory: pytest.TempPathFactory) -> Record:
+    """Return a record of a T-37 as its rig file says."""
+    return made(tmp_path_factory.mktemp("flown"), nominal_rig(True), {}, 5)
+
+
+@pytest.mark.parametrize("name", ["elevator_rad", "pitch_rate_rad_per_s"])
+def test_a_motion_of_another_sign_than_the_models_is_refused(flown: Record, name: str) -> None:
+    """A reversed surface was a gap that no effect explains."""
+    data = flown.data.copy()
+    data[:, flown.channels.index(name)] *= -1.0
+    with pytest.raises(InputError, match=rf"r.csv: {name}: moves against that of .*reversed\?"):
+        diagnose(nominal_rig(True), {"r.csv": replace(flown, data=data)}, "column")
+
+
+def test_a_motion_of_the_models_sign_is_judged(flown: Record) -> None:
+    assert diagnose(nominal_rig(True), {"r.csv": flown}, "column").verdict == "no_gap"

@@ -213,11 +213,14 @@ def from_newtons(ratio: float) -> bool:
     return abs(ratio / POUND_N - 1.0) < 0.25
 
 
-def move_oppositely(first: Floats, second: Floats) -> bool:
-    """Tell whether two channels that should have one sign have opposite ones."""
+def move_oppositely(first: Floats, second: Floats, most: float = -0.3) -> bool:
+    """Tell whether two channels that should have one sign have opposite ones.
+
+    Their correlation is then below `most`.
+    """
     a, b = first - np.median(first), second - np.median(second)
     scale = float(np.sqrt((a @ a) * (b @ b)))
-    return scale > 0.0 and float(a @ b) / scale < -0.3
+    return scale > 0.0 and float(a @ b) / scale < most
 
 
 def drives_the_hand(force_N: Floats, deflection: Floats) -> bool:
