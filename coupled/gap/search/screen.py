@@ -228,7 +228,9 @@ class Screen:
         """Return an effect's signatures with the current effects.
 
         That of an effect of the airframe is its slope, from a small step: between trims further
-        apart, what the trim has left of the accelerations jumps.
+        apart, what the trim has left of the accelerations jumps. Of others the sizes go on while a
+        larger one leaves less. The best of these is a further start (shape `~shape`): in a residual
+        of several effects the smaller one may be right.
         """
         now = _residual(self.problem, effect, current.rig)
         flown = STAGE_OF[effect.stage].flown
@@ -250,9 +252,10 @@ class Screen:
             while ours and not flown and effect.seen is None:
                 best = min(ours, key=left)
                 further = _further(self.problem, effect, best.values, [one.values for one in ours])
-                ours += made(further, shape) if further is not None else []
-                if min(ours, key=left) is best:
+                more = made(further, ~shape) if further is not None else []
+                if not more or left(more[0]) >= left(best):
                     break
+                ours += more
             found += ours
         return found
 
