@@ -58,15 +58,7 @@ FRICTIONS: tuple[Effect, ...] = (
                 above="loader.friction_N",
             ),
             value(
-                *(
-                    "stribeck_{d}_per_s",
-                    "loader.stribeck_rate_{d}_per_s",
-                    2e-4,
-                    0.05,
-                    2e-3,
-                    2e-3,
-                    1e-2,
-                ),
+                *("stribeck_{d}_per_s", "loader.stribeck_rate_{d}_per_s", 2e-4, 0.05, 2e-3),
                 role="shape",
             ),
         ),
