@@ -182,8 +182,7 @@ def test_a_residual_that_nothing_explains_is_held_against_everything(tmp_path: P
     spoiled = Record(record.channels, data)
     (diagnosis,) = diagnose(nominal, {"r.csv": spoiled}, "column").parts
     assert diagnosis.verdict == "unexplained"
-    assert diagnosis.choice.tried == {}  # all effects are screened out
-    assert diagnosis.choice.rounds == ()
+    assert diagnosis.choice.steps == ()  # none was worth a fit, and those made all the same fail
     figures = draw_diagnosis(diagnosis)
     figure = figures["signature.png"]
     figure.draw_without_rendering()

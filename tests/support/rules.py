@@ -87,6 +87,8 @@ class Rule:
 RULES = (
     Rule("needed", "search.beam:Beam._needed", gives(frozenset()),
          "an effect whose interval includes neutral is kept if all simpler sets lose by 5"),
+    Rule("contact_once", "search.beam:_contact_values", gives({}),
+         "laws of friction start from presliding parameters fitted before"),
     Rule("last_swaps", "search.beam:_sets_with_swap", gives([]),
          "swaps in the best set, at the end", "_fit_neighbours_of_best"),
     Rule("two_for_one", "search.beam:_fit_with_simpler_law", gives(None),

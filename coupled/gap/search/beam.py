@@ -16,7 +16,7 @@ shooting. All starts are fitted for a few evaluations, and those far behind the 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -82,7 +82,8 @@ class Beam:
 
     `without_effects` is the fit of the nuisance parameters alone, within their tolerance.
     `error` is the model error of each output, `counts` its residual's effective samples.
-    `finished` are the sets fitted at the loader's own steps.
+    `finished` are the sets fitted at the loader's own steps. `contact` holds the presliding
+    parameters of dry friction from the last fit that estimated them.
     """
 
     problem: Problem
@@ -93,6 +94,7 @@ class Beam:
     known: dict[Names, Evidence] = field(default_factory=dict)
     finished: set[Names] = field(default_factory=set)
     best: Names = frozenset()
+    contact: Start = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Make the screen of candidates, which caches their signatures."""
@@ -330,7 +332,7 @@ def _fit_neighbours_of_best(beam: Beam, library: Sequence[Effect]) -> None:
                 screened = beam.screen.best(part, beside, worth, TRIES)
                 _fit_sets(
                     beam,
-                    [t for one in screened for t in _starts_with_one_more(part, one)],
+                    [t for one in screened for t in _starts_with_one_more(part, one, beam.contact)],
                 )
         _finish(beam)
         _restart_simple_sets(beam)
@@ -389,9 +391,9 @@ def _fit_neighbours(beam: Beam, fitted: Fit, library: Sequence[Effect], wanted: 
     The candidate of the largest predicted gain is fitted first, and the others only if they may do
     better. If none is worth a fit beside the best set, a few are fitted all the same: the gain of a
     law whose shape is far from that of its start cannot be predicted. A law that contains another
-    law is fitted after it, from its optimum, if the best set leaves an output unexplained. Effects
-    are screened with the nuisance parameters within their tolerance: beyond it they may have
-    absorbed an effect.
+    law is fitted after it, from its optimum, if the best set leaves an output unexplained. Laws of
+    dry friction start from presliding parameters that were fitted before. Effects are screened with
+    the nuisance parameters within their tolerance: beyond it they may have absorbed an effect.
     """
     is_best, found, worth = names_of(fitted.effects) == beam.best, fitted, beam.worth(fitted)
     fitted, beside = (
@@ -409,11 +411,16 @@ def _fit_neighbours(beam: Beam, fitted: Fit, library: Sequence[Effect], wanted: 
     for some in (plain[:1], plain[1:]):
         worth = beam.worth(found, MOST)
         still = some if doubtful else beam.screen.still_worth(fitted, some, worth)
-        ends += _fit_sets(beam, [t for one in still for t in _starts_with_one_more(fitted, one)])
+        dry = next((one for one in still if one.effect.dry), None)
+        if dry is not None and not beam.contact:
+            first = _fit_sets(beam, _starts_with_one_more(fitted, dry, {}))
+            beam.contact = _contact_values(beam, first[0]) if first else {}
+        tries = [t for one in still for t in _starts_with_one_more(fitted, one, beam.contact)]
+        ends += _fit_sets(beam, tries)
     if beam.best and not beam.open_outputs(beam.best):
         return
     wider = [one for one in screened if one not in plain]
-    others = [t for one in wider for t in _starts_with_one_more(fitted, one)]
+    others = [t for one in wider for t in _starts_with_one_more(fitted, one, beam.contact)]
     for end in ends:
         others += [
             t
@@ -460,10 +467,17 @@ def _candidates(
     ]
 
 
-def _starts_with_one_more(fitted: Fit, one: Screened) -> list[Try]:
-    """Return the starts of a set with one effect more."""
+def _starts_with_one_more(fitted: Fit, one: Screened, contact: Mapping[str, float]) -> list[Try]:
+    """Return the starts of a set with one effect more; `contact`: its presliding parameters."""
     effects = (*fitted.effects, one.effect)
-    return [(effects, {**fitted.values, **start}, fitted) for start in one.starts]
+    beside = contact if one.effect.dry else {}
+    return [(effects, {**beside, **fitted.values, **start}, fitted) for start in one.starts]
+
+
+def _contact_values(beam: Beam, fitted: Fit) -> Start:
+    """Return the presliding parameters of a fit that are nuisance parameters."""
+    keys = {one.value_key(p) for one in beam.problem.case.contact for p in one.free}
+    return {key: value for key, value in fitted.values.items() if key in keys}
 
 
 def _sets_with_swap(beam: Beam, fitted: Fit, library: Sequence[Effect]) -> list[Try]:
@@ -480,7 +494,9 @@ def _sets_with_swap(beam: Beam, fitted: Fit, library: Sequence[Effect]) -> list[
         if rig is not None and same:
             base = replace(fitted, effects=rest, rig=rig)
             found = beam.screen.best(base, same, beam.worth(base, MOST), TRIES)
-            tries += [t for one in found for t in _starts_with_one_more(base, one)[:1]]
+            tries += [
+                t for one in found for t in _starts_with_one_more(base, one, beam.contact)[:1]
+            ]
     return tries
 
 
