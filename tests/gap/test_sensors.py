@@ -66,7 +66,9 @@ def flown(tmp_path_factory: pytest.TempPathFactory) -> Record:
     return made(tmp_path_factory.mktemp("flown"), nominal_rig(True), {}, 5)
 
 
-@pytest.mark.parametrize("name", ["elevator_rad", "pitch_rate_rad_per_s"])
+@pytest.mark.parametrize(
+    "name", ["elevator_rad", pytest.param("pitch_rate_rad_per_s", marks=pytest.mark.slow)]
+)
 def test_a_motion_of_another_sign_than_the_models_is_refused(flown: Record, name: str) -> None:
     """A reversed surface was a gap that no effect explains."""
     data = flown.data.copy()
@@ -75,5 +77,6 @@ def test_a_motion_of_another_sign_than_the_models_is_refused(flown: Record, name
         diagnose(nominal_rig(True), {"r.csv": replace(flown, data=data)}, "column")
 
 
+@pytest.mark.slow
 def test_a_motion_of_the_models_sign_is_judged(flown: Record) -> None:
     assert diagnose(nominal_rig(True), {"r.csv": flown}, "column").verdict == "no_gap"

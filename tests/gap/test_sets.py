@@ -312,7 +312,7 @@ def test_of_laws_that_contain_one_another_the_one_that_is_there_is_named(
 LIGHT = {"bend_{d}_per_N": 1e-4, "damping_ratio": 0.04}
 
 
-@pytest.mark.parametrize("frequency_Hz", [0.7, 14.0])
+@pytest.mark.parametrize("frequency_Hz", [0.7, pytest.param(14.0, marks=pytest.mark.slow)])
 def test_a_fit_of_a_lightly_damped_mode_starts_within_its_bandwidth(frequency_Hz: float) -> None:
     values = LIGHT | {"frequency_Hz": frequency_Hz}
     case = stage_of_record("linkage", "structural_mode", tuple(values.items()), 31)
