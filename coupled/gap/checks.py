@@ -173,7 +173,8 @@ def _check_signs(rig: Rig, record: Record, control: ControlName, file: object) -
 def check_against_model(outputs: Sequence[Output], rig: Rig, files: Sequence[object]) -> None:
     """Raise InputError if a surface, or the pitch or roll rate, moves against the model's.
 
-    No effect of the library reverses these. The yaw rate and slow motion may be reversed by one.
+    No effect of the library reverses these. Errors of the model may reverse the yaw rate, by
+    adverse yaw, and slow changes of speed or height.
     """
     signed = (*map(surface_channel, CONTROL_NAMES), RATE["column"], RATE["wheel"])
     for output in outputs:

@@ -228,9 +228,10 @@ class Screen:
         """Return an effect's signatures with the current effects.
 
         That of an effect of the airframe is its slope, from a small step: between trims further
-        apart, what the trim has left of the accelerations jumps. Of others the sizes go on while a
-        larger one leaves less. The best of these is a further start (shape `~shape`): in a residual
-        of several effects the smaller one may be right.
+        apart, what the trim has left of the accelerations jumps. For other effects, sizes beyond
+        the usual ones are tried while a larger size leaves a smaller residual. The best of them is
+        an additional start, with shape `~shape`: in the residual of several effects the size among
+        the usual ones may be right.
         """
         now = _residual(self.problem, effect, current.rig)
         flown = STAGE_OF[effect.stage].flown

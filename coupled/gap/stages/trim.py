@@ -107,9 +107,10 @@ def _standing_off(rig: Rig, record: Record, control: ControlName) -> tuple[float
     """Return a surface's initial offset from trim and command, and its standard error, rad.
 
     Shortfall and lag behind the command are fitted too; if the command moves at once, they would
-    imitate another trim. The offset is estimated over the longest time at the record's start in
-    which the fit leaves noise alone, since play or a dead zone leaves more; if the fit leaves more
-    in all, over the shortest. None if the record does not have the command.
+    imitate another trim. The offset is estimated over the longest of `STANDING_s` from the record's
+    start whose residual is noise alone: with play or a dead zone the residual is larger. If it is
+    larger for each of these times, the shortest is used. Return None if the record does not have
+    the command.
     """
     name, pressure = channel(control, "estimate"), "dynamic_pressure_Pa"
     points = surface_points(rig, control)
