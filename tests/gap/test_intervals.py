@@ -27,10 +27,12 @@ def test_an_interval_counts_what_is_known_of_a_setting(spread: float) -> None:
     same = np.ones((FRAMES, 2))
     found = End(np.zeros(2), 0.0, left - left.mean(), same, None)
     groups = np.arange(FRAMES) // 300
-    half = half_width(found, 1, groups, np.array([0.0, 1.0 / spread**2]), NONE)
+    half = half_width(found, [FRAMES], groups, np.array([0.0, 1.0 / spread**2]), NONE)
     wanted = student.ppf(0.975, 6) * np.hypot(spread, 1.0 / np.sqrt(FRAMES))
     assert half[0] == pytest.approx(wanted, rel=0.15)
-    alone = half_width(replace(found, fun=left, jac=same[:, :1]), 1, groups, np.zeros(1), NONE)
+    alone = half_width(
+        replace(found, fun=left, jac=same[:, :1]), [FRAMES], groups, np.zeros(1), NONE
+    )
     assert alone[0] < half[0]
 
 
@@ -42,8 +44,8 @@ def test_numbers_that_are_known_beforehand_take_no_degree_of_freedom() -> None:
     slopes = np.column_stack((np.ones(FRAMES), 1e-3 * rng.normal(size=(FRAMES, 6))))
     found = End(np.zeros(7), 0.0, left - left.mean(), slopes, None)
     priors = np.array([0.0, *np.ones(6)])
-    half = half_width(found, 1, groups, priors, NONE)
-    alone = half_width(replace(found, jac=slopes[:, :1]), 1, groups, np.zeros(1), NONE)
+    half = half_width(found, [FRAMES], groups, priors, NONE)
+    alone = half_width(replace(found, jac=slopes[:, :1]), [FRAMES], groups, np.zeros(1), NONE)
     assert half[0] < 3.0 * alone[0]
 
 
@@ -55,8 +57,8 @@ def test_an_error_of_the_input_that_lasts_widens_an_interval_as_it_moves_the_est
     found = End(np.zeros(1), 0.0, noise, shape, None)
     given_error = np.outer(sizes, shape[:, 0]) + rng.normal(size=(3, FRAMES))
     groups = np.arange(FRAMES) // 300
-    half = half_width(found, 1, groups, np.zeros(1), given_error)
-    assert half_width(found, 1, groups, np.zeros(1), NONE)[0] < 0.15
+    half = half_width(found, [FRAMES], groups, np.zeros(1), given_error)
+    assert half_width(found, [FRAMES], groups, np.zeros(1), NONE)[0] < 0.15
     wanted = student.ppf(0.975, 3) * np.sqrt(np.mean(sizes**2))
     assert half[0] == pytest.approx(wanted, rel=0.15)
 
@@ -96,7 +98,7 @@ def test_intervals_of_a_short_record_hold_and_say_something(numbers: int) -> Non
         noise = rng.normal(size=len(groups))
         found = np.asarray(np.linalg.lstsq(shapes, noise, rcond=None)[0], np.float64)
         end = End(found, 0.0, noise - shapes @ found, shapes, None)
-        half = half_width(end, 1, groups, np.zeros(numbers), NONE)
+        half = half_width(end, [len(groups)], groups, np.zeros(numbers), NONE)
         held += abs(found[0]) < half[0]
         widths.append(half[0] * np.sqrt(len(groups)))
     assert held >= 184  # of 190 on the mean

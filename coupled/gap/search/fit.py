@@ -3,11 +3,15 @@
 The residuals are in noise floors, so each channel weighs by its noise. With the residual r of the
 outputs, the effects' parameters θ and the nuisance parameters φ, a fit minimises
 
-    ½·Σ_o Σ r_o(θ, φ)²·q/q_o + ½·u·Σ ((φ − φ₀)/σ)²,    q = min q_o,  u = min τ_o·q_o
+    ½·Σ_o w_o·Σ r_o(θ, φ)² + ½·u·Σ ((φ − φ₀)/σ)²
+
+    w_o = min(q·λ)/(q_o·λ_o)    u = min w_o·q_o·τ_o
 
 q_o is the mean square of output o's residual, 1 at least, and τ_o its autocorrelation time in
 frames, both where the fit starts; records of one channel share their q_o, the mean over its frames,
-since their noise and misfit are of one machine. An output that another effect disturbs weighs less.
+since their noise and misfit are of one machine. λ_o is the autocorrelation time of the noise floor
+(`Output.lasts`). An output that another effect disturbs weighs less, and so does one whose noise
+lasts: every frame is counted, but the speed after a wrong restart is one error, not hundreds.
 u is one unit of −2 log-likelihood, so the nuisance parameters' Gaussian priors, the second sum,
 weigh against the data as they do in a posterior. Fits run in several legs, so the weights follow
 the residual.
@@ -34,7 +38,7 @@ from coupled.gap.search.case import Case
 from coupled.gap.search.descent import WHOLE, Descent, End, Slope
 from coupled.gap.search.found import Fit, Group
 from coupled.gap.search.intervals import cost_of_unit_likelihood, half_width, least_of, open_above
-from coupled.gap.signals.output import TRIM, Output, Part, memory
+from coupled.gap.signals.output import TRIM, Output, Part
 from coupled.gap.thresholds import DOUBLED, FAR, ROUNDS, TINY, TRIM_SIGMAS
 from coupled.parallel import go_on
 from coupled.record.channels import ControlName
@@ -186,7 +190,7 @@ def _fit(
     firsts = [np.array(first) / scale for first in _starts(effects, start)]
     begun = plain(firsts[0], coarse=True)
     squares = _squares(ours, begun)
-    weights = [math.sqrt(min(squares) / one) for one in squares]
+    weights = _weights(ours, squares)
 
     def residual(scaled: Floats, coarse: bool = False, rough: bool = False) -> Floats:
         lefts = zip(plain(scaled, coarse, rough), weights, strict=True)
@@ -198,7 +202,7 @@ def _fit(
     ends = np.array([p.bounds(nominal, control) for p in frees]).T
     low, high = ends / scale
     stepped = any(output.stepped for output in ours)
-    unit = min(_unit(left) for left in begun)
+    unit = min(w**2 * _unit(o, left) for w, o, left in zip(weights, ours, begun, strict=True))
     prior = _Priors.of([priors.get(key) for key in keys], scale, unit)
     # The presliding parameters are free if the rig file has dry friction.
     dry = any(one.dry for one in effects) or any(p.key in CONTACT for p in frees)
@@ -221,12 +225,12 @@ def _fit(
             edge = _with(best.x, k, least_of(partial(cost, k=k), span, most))
             found = search.end(with_prior, [edge], (low, high), stepped)
             best = min(best, prior.without(found), key=lambda one: one.cost)
-    free = _Free(keys, frees, scale, ends, weights, frames)
-    there = _with_trim(best, free, ours) if descent.most == WHOLE.most else None
+    free = _Free(keys, frees, scale, ends, ours, weights, frames)
+    there = _with_trim(best, free) if descent.most == WHOLE.most else None
     if there is not None:
         found = search.end(with_prior, [np.clip(there, low, high)], (low, high), stepped)
         best = min(best, prior.without(found), key=lambda one: one.cost)
-    changed = _changed(squares, best, free, ours)
+    changed = _changed(squares, best, free)
     if legs > 1 and descent.steps != "coarse" and changed > DOUBLED:
         again = dict(zip(keys, (best.x * scale).tolist(), strict=True))
         rest = replace(descent, slopes={})
@@ -266,21 +270,22 @@ class Cost(Protocol):
 class _Free:
     """The free parameters of a fit: keys, scales, and `ends`, their bounds.
 
-    `weights` are the weights of the outputs' residuals, `frames` their numbers of frames.
+    `weights` are those of the `outputs`' residuals, `frames` their numbers of frames.
     """
 
     keys: list[str]
     numbers: list[Parameter]
     scale: Floats
     ends: Floats
+    outputs: Sequence[Output]
     weights: list[float]
     frames: list[int]
 
-    def parts(self) -> Iterator[tuple[slice, float]]:
-        """Yield the rows of each output in a fit, and their weight."""
-        edges = np.cumsum([0, *self.frames]).tolist()
-        for (first, last), weight in zip(pairwise(edges), self.weights, strict=True):
-            yield slice(first, last), weight
+    def parts(self) -> Iterator[tuple[Output, slice, float]]:
+        """Yield each output in a fit, its rows, and their weight."""
+        edges = pairwise(np.cumsum([0, *self.frames]).tolist())
+        for output, (first, last), weight in zip(self.outputs, edges, self.weights, strict=True):
+            yield output, slice(first, last), weight
 
 
 def _group(
@@ -298,8 +303,7 @@ def _group(
     `errors` samples of the inputs' error, shape (samples, rows).
     """
     (low, high), scale = free.ends / free.scale, free.scale
-    outputs = len(free.frames)
-    half = half_width(best, outputs, stretches, prior.precision, errors) * scale
+    half = half_width(best, free.frames, stretches, prior.precision, errors) * scale
     # A lower bound at which nothing is left of the filed value is a valid result, not a bound.
     gone = np.isclose(best.x, low, atol=1e-4) & (free.ends[0] < [p.low for p in free.numbers])
     values = best.x * scale
@@ -316,7 +320,7 @@ def _group(
     stuck |= ~np.isfinite(half) & ~np.array([p.may_end and p.is_limit for p in free.numbers])
     lower, upper = values - half, values + half
     for k in (k for k, p in enumerate(free.numbers) if p.kind == "saturating"):
-        span, unit = (float(low[k]), float(high[k])), cost_of_unit_likelihood(best, outputs)
+        span, unit = (float(low[k]), float(high[k])), cost_of_unit_likelihood(best, free.frames)
         open_one = open_above(partial(cost, k=k), float(best.x[k]), span, unit)
         if open_one is not None:
             values[k], lower[k], upper[k] = open_one[0] * scale[k], open_one[1] * scale[k], np.inf
@@ -333,9 +337,9 @@ def _group(
     )
 
 
-def _unit(left: Floats) -> float:
-    """Return the sum of squares that is one unit of −2 log-likelihood."""
-    return max(float(np.mean(left**2)), 1.0) * memory(left)
+def _unit(output: Output, left: Floats) -> float:
+    """Return the sum of squares that is one unit of −2 log-likelihood of an output's residual."""
+    return max(float(np.mean(left**2)), 1.0) * len(left) / output.samples(left)
 
 
 def _squares(outputs: Sequence[Output], lefts: Sequence[Floats]) -> list[float]:
@@ -346,6 +350,12 @@ def _squares(outputs: Sequence[Output], lefts: Sequence[Floats]) -> list[float]:
         same = [left for left, other in zip(lefts, channels, strict=True) if other == channel]
         found.append(max(float(np.mean(np.concatenate(same) ** 2)), 1.0))
     return found
+
+
+def _weights(outputs: Sequence[Output], squares: Sequence[float]) -> list[float]:
+    """Return √w_o of each output, from its mean square q_o."""
+    noisy = [square * output.lasts for square, output in zip(squares, outputs, strict=True)]
+    return [math.sqrt(min(noisy) / one) for one in noisy]
 
 
 def _with_slopes(
@@ -362,15 +372,14 @@ def _with_slopes(
     return replace(descent, dry=dry, held=held), slope
 
 
-def _with_trim(end: End, free: _Free, outputs: Sequence[Output]) -> Floats | None:
+def _with_trim(end: End, free: _Free) -> Floats | None:
     """Return the parameters with which the model trims as the records do; None if it does.
 
     Beyond the trim's error a flight is moved to the model's own trim (`openloop`), and the cost has
     another minimum there. Of all parameters with the record's trim, to first order, these increase
     the cost least.
     """
-    each = zip(free.parts(), outputs, strict=True)
-    trims = [rows for (rows, _), output in each if output.channel == TRIM]
+    trims = [rows for output, rows, _ in free.parts() if output.channel == TRIM]
     if not trims:
         return None
     left = np.concatenate([end.fun[rows] for rows in trims])
@@ -382,9 +391,9 @@ def _with_trim(end: End, free: _Free, outputs: Sequence[Output]) -> Floats | Non
     return np.asarray(end.x - toward * left.mean() / reach)
 
 
-def _changed(squares: Sequence[float], end: End, free: _Free, outputs: Sequence[Output]) -> float:
+def _changed(squares: Sequence[float], end: End, free: _Free) -> float:
     """Return the largest factor by which a channel's mean square changed in a weighted fit."""
-    ended = _squares(outputs, [end.fun[rows] / weight for rows, weight in free.parts()])
+    ended = _squares(free.outputs, [end.fun[rows] / weight for _, rows, weight in free.parts()])
     return max(max(a / b, b / a) for a, b in zip(squares, ended, strict=True))
 
 
@@ -399,9 +408,9 @@ def _plain(slope: Slope | None, weights: Floats) -> Slope | None:
 def _information(end: End, free: _Free) -> Floats:
     """Return the information matrix of the log-likelihood at the end of a weighted fit."""
     total = np.zeros((end.jac.shape[1], end.jac.shape[1]))
-    for rows, weight in free.parts():
+    for output, rows, weight in free.parts():
         jacobian = end.jac[rows] / weight
-        total += jacobian.T @ jacobian / _unit(end.fun[rows] / weight)
+        total += jacobian.T @ jacobian / _unit(output, end.fun[rows] / weight)
     return total
 
 

@@ -12,7 +12,7 @@ third is the scatter of the estimates (JᵀJ)⁻¹·Jᵀ·e of samples e of the 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,17 +25,20 @@ from coupled.gap.thresholds import DOUBLED, EDGE_BISECTIONS, LEAST_MEMORIES
 Numbers = NDArray[np.intp]
 
 
-def half_width(found: End, outputs: int, groups: Numbers, known: Floats, errors: Floats) -> Floats:
+def half_width(
+    found: End, frames: Sequence[int], groups: Numbers, known: Floats, errors: Floats
+) -> Floats:
     """Return half of each scaled parameter's 95 % interval; infinite if it is undetermined.
 
     The largest of three: from the residual's variance and correlation time, from the sandwich
-    estimator, and from samples of the input's error, `errors`, shape (samples, rows). `groups` are
-    the stretch numbers of the rows, `known` the 1/variance of the priors.
+    estimator, and from samples of the input's error, `errors`, shape (samples, rows). `frames` are
+    the outputs' numbers of rows, `groups` the stretch numbers of the rows, and `known` the
+    1/variance of the priors.
     """
     jacobian, left = found.jac, found.fun
-    variance, widen = _counted(left, outputs)
+    variance, unit, widen = _counted(left, frames)
     before = np.diag(known)
-    plain = np.linalg.pinv(jacobian.T @ jacobian / (variance * widen) + before)
+    plain = np.linalg.pinv(jacobian.T @ jacobian / unit + before)
     slopes = jacobian.T @ jacobian / variance
     bread = np.linalg.pinv(slopes + before)
     parts = cut(groups, jacobian.shape[1], widen)
@@ -83,17 +86,20 @@ def least_of(cost: Callable[[float], float], ends: tuple[float, float], limit: f
     return above
 
 
-def cost_of_unit_likelihood(found: End, outputs: int) -> float:
+def cost_of_unit_likelihood(found: End, frames: Sequence[int]) -> float:
     """Return the cost, half a sum of squares, of one unit of log-likelihood at the optimum."""
-    square, memories = _counted(found.fun, outputs)
-    return square * memories
+    return _counted(found.fun, frames)[1]
 
 
-def _counted(left: Floats, outputs: int) -> tuple[float, float]:
-    """Return a residual's mean square, and the longest correlation time of an output, frames."""
-    rows = len(left) // outputs
-    memories = max(memory(left[i * rows : (i + 1) * rows]) for i in range(outputs))
-    return max(float(np.mean(left**2)), 1e-12), memories
+def _counted(left: Floats, frames: Sequence[int]) -> tuple[float, float, float]:
+    """Return the largest of each of three numbers of the outputs of a weighted residual.
+
+    They are the mean square, the mean square times the correlation time, and that time, frames.
+    """
+    parts = np.split(left, np.cumsum(frames)[:-1])
+    squares = np.array([max(float(np.mean(part**2)), 1e-12) for part in parts])
+    memories = np.array([memory(part) for part in parts])
+    return float(squares.max()), float((squares * memories).max()), float(memories.max())
 
 
 def cut(groups: Numbers, numbers: int, memories: float) -> Numbers:
