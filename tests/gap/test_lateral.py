@@ -66,6 +66,22 @@ def test_a_surface_of_wheel_and_pedals_is_judged(
     assert turned.after < 0.5 * turned.before
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("inertia", 0.5), ("backlash", 0.12)],
+    ids=["a contact that absorbed it", "turns that a column cannot move"],
+)
+def test_a_large_gap_of_a_wheel_has_one_name(cessna: Rig, name: str, value: float) -> None:
+    """The rig file has dry friction, so that presliding parameters are fitted before the effect."""
+    (number,) = BY_NAME[name].free
+    real = apply(cessna, "wheel", [BY_NAME[name]], {f"{name}.{number.name}": value})
+    record = fly_force(real, pushes(cessna, pedals=160.0, wheel=40.0), seed=3)
+    (found,) = diagnose(cessna, {"r": record}, "wheel").effects
+    assert found.name == name
+    assert found.parameters[0].value == pytest.approx(value, rel=0.03)
+
+
 def test_a_damped_rudder_is_not_judged_by_its_command() -> None:
     jet = noisy(read_rig(aircraft_folder() / "737" / "737.toml"))
     assert surface_points(jet, "pedals") is None  # the yaw damper moves it

@@ -14,6 +14,7 @@ from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
+from tests.support.joined import joined
 from tests.support.machines import plain_rig
 
 TIME_s = np.arange(600) / 100.0
@@ -58,6 +59,17 @@ def test_the_library_is_as_it_is_for_a_machine_like_a_column() -> None:
     for one, other in zip(EFFECTS, same, strict=True):
         for p, q in zip(one.parameters, other.parameters, strict=True):
             assert (p.low, p.high, p.starts) == (q.low, q.high, q.starts)
+
+
+@pytest.mark.parametrize("way", [0.1, 0.3, 1.2])
+def test_a_wheel_turns_ten_times_as_many_rad_as_a_column_moves_m(way: float) -> None:
+    rig = joined()
+    wheels = in_scale(EFFECTS, Scales(12.0, way, 0.3), rig, "wheel")
+    scaled = {one.name: one.free[0] for one in wheels if one.free}
+    for name, power in (("backlash", 1), ("bend", 1), ("cubic_stiffness", -3), ("inertia", 0)):
+        column, wheel = BY_NAME[name].free[0], scaled[name]
+        assert wheel.starts == pytest.approx([10.0**power * start for start in column.starts])
+        assert wheel.high == pytest.approx(10.0**power * column.high)
 
 
 @settings(deadline=None, max_examples=25)

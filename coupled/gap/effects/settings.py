@@ -97,9 +97,7 @@ def contact(rig: Rig, control: ControlName) -> tuple[Effect, ...]:
 
 def most_yielding(control: ControlName) -> float:
     """Return the largest presliding length, d."""
-    return (
-        (YIELDS_m * COLUMN_WAY["rad"] / COLUMN_WAY["m"]) if unit_of(control) == "rad" else YIELDS_m
-    )
+    return YIELDS_m * COLUMN_WAY[unit_of(control)] / COLUMN_WAY["m"]
 
 
 def is_dry(rig: Rig, control: ControlName) -> bool:
@@ -198,13 +196,17 @@ class Scales:
         return float(np.prod(np.array((self.force_N, self.way, self.time_s)) ** powers))
 
     def times_columns(self, unit: str, control: ControlName) -> float:
-        """Return the factor on a column's value by its unit; 1 for a machine of similar size."""
+        """Return the factor on a column's value by its unit; 1 for a machine of similar size.
+
+        The library's lengths are a column's in m. A wheel turns 0.3 rad where a column moves 0.03.
+        """
         powers = _powers(unit)
         if powers is None:
             return 1.0
-        force, way = self.force_N / COLUMN_FORCE_N, self.way / COLUMN_WAY[unit_of(control)]
+        usual = COLUMN_WAY[unit_of(control)]
+        force, way = self.force_N / COLUMN_FORCE_N, self.way / usual
         like = [1.0 if 1.0 / OTHER_SCALE < r < OTHER_SCALE else r for r in (force, way)]
-        return float(like[0] ** powers[0] * like[1] ** powers[1])
+        return float(like[0] ** powers[0] * (like[1] * usual / COLUMN_WAY["m"]) ** powers[1])
 
 
 def in_scale(

@@ -16,7 +16,7 @@ shooting. All starts are fitted for a few evaluations, and those far behind the 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -332,7 +332,7 @@ def _fit_neighbours_of_best(beam: Beam, library: Sequence[Effect]) -> None:
                 screened = beam.screen.best(part, beside, worth, TRIES)
                 _fit_sets(
                     beam,
-                    [t for one in screened for t in _starts_with_one_more(part, one, beam.contact)],
+                    [t for one in screened for t in _starts_with_one_more(beam, part, one)],
                 )
         _finish(beam)
         _restart_simple_sets(beam)
@@ -413,14 +413,14 @@ def _fit_neighbours(beam: Beam, fitted: Fit, library: Sequence[Effect], wanted: 
         still = some if doubtful else beam.screen.still_worth(fitted, some, worth)
         dry = next((one for one in still if one.effect.dry), None)
         if dry is not None and not beam.contact:
-            first = _fit_sets(beam, _starts_with_one_more(fitted, dry, {}))
+            first = _fit_sets(beam, _starts_with_one_more(beam, fitted, dry))
             beam.contact = _contact_values(beam, first[0]) if first else {}
-        tries = [t for one in still for t in _starts_with_one_more(fitted, one, beam.contact)]
+        tries = [t for one in still for t in _starts_with_one_more(beam, fitted, one)]
         ends += _fit_sets(beam, tries)
     if beam.best and not beam.open_outputs(beam.best):
         return
     wider = [one for one in screened if one not in plain]
-    others = [t for one in wider for t in _starts_with_one_more(fitted, one, beam.contact)]
+    others = [t for one in wider for t in _starts_with_one_more(beam, fitted, one)]
     for end in ends:
         others += [
             t
@@ -467,11 +467,18 @@ def _candidates(
     ]
 
 
-def _starts_with_one_more(fitted: Fit, one: Screened, contact: Mapping[str, float]) -> list[Try]:
-    """Return the starts of a set with one effect more; `contact`: its presliding parameters."""
-    effects = (*fitted.effects, one.effect)
-    beside = contact if one.effect.dry else {}
-    return [(effects, {**beside, **fitted.values, **start}, fitted) for start in one.starts]
+def _starts_with_one_more(beam: Beam, fitted: Fit, one: Screened) -> list[Try]:
+    """Return the starts of a set with one effect more.
+
+    New dry friction starts at the presliding parameters fitted before (`Beam.contact`). Those of a
+    fitted set may have absorbed what the effect explains, and hold it in a local minimum: each
+    start is also made with them as filed.
+    """
+    effects, filed = (*fitted.effects, one.effect), beam.problem.case.neutral
+    given = {**(beam.contact if one.effect.dry else {}), **fitted.values}
+    as_filed = {key: filed[key] for key in _contact_values(beam, fitted)}
+    begun = [given, given | as_filed] if as_filed else [given]
+    return [(effects, values | start, fitted) for values in begun for start in one.starts]
 
 
 def _contact_values(beam: Beam, fitted: Fit) -> Start:
@@ -494,9 +501,7 @@ def _sets_with_swap(beam: Beam, fitted: Fit, library: Sequence[Effect]) -> list[
         if rig is not None and same:
             base = replace(fitted, effects=rest, rig=rig)
             found = beam.screen.best(base, same, beam.worth(base, MOST), TRIES)
-            tries += [
-                t for one in found for t in _starts_with_one_more(base, one, beam.contact)[:1]
-            ]
+            tries += [t for one in found for t in _starts_with_one_more(beam, base, one)[:1]]
     return tries
 
 
