@@ -266,6 +266,30 @@ def test_the_drift_after_a_restart_is_not_taken_for_more_wrong_functions(tmp_pat
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(("model", "name"), [("c172p", "CYp"), ("737", "CDde")])
+def test_a_faint_function_is_named_where_the_motion_is_within_its_noise(
+    tmp_path: Path, model: str, name: str
+) -> None:
+    """A 737's drag shows most in its trim, beside which the slopes of the flight are an eighth."""
+    rig, of = read_rig(shipped_rigs()[model]), f"aero/coefficient/{name}"
+    found = diagnose(rig, {"r": motion_of(flown(tmp_path, rig, of, 0.7))}, "column", terms=True)
+    (effect,) = found.effects
+    (factor,) = effect.parameters
+    assert (found.verdict, effect.of, found.rivals) == ("effect", of, ())
+    assert factor.low is not None and factor.high is not None
+    assert factor.low < 0.7 < factor.high
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("model", ["c172p", "737", "t37"])
+def test_no_function_of_a_right_model_is_named(model: str) -> None:
+    rig = read_rig(shipped_rigs()[model])
+    record = motion_of(fly_force(noisy(rig), pulses(rig), seed=3))
+    found = diagnose(rig, {"r": record}, "column", terms=True)
+    assert (found.verdict, found.effects) == ("no_gap", ())
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [effect.name for effect in AIRFRAME if "gust" not in effect.name])
 def test_each_factor_is_named_at_its_size(cessna: Rig, name: str) -> None:
     """By surfaces and motion alone, within 3 standard errors: 14 sizes are tested.

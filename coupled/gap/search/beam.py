@@ -286,15 +286,18 @@ def _search_from(
 def _search_by_depth(beam: Beam, library: Sequence[Effect]) -> tuple[dict[str, float], ...]:
     """Fit the neighbours of the best sets, depth by depth, until one explains every stage.
 
-    Return the gain in log evidence of each depth's sets, by the effect added.
+    The functions of an aircraft model are in a library if a user asks which of them is wrong. One
+    is then tried also where the motion is within its noise (`_choose`). Return the gain in log
+    evidence of each depth's sets, by the effect added.
     """
     front, best, known = beam.leading(), beam.best, set(beam.fits)
+    asked = {output for effect in library if effect.of for output in effect.shows_in}
     depths = list[tuple[Names, set[Names]]]()
     for _ in range(BEAM_DEPTH):
         if not front or (best and not beam.open_outputs(best)):
             break
         for names in front:
-            if wanted := beam.open_outputs(names):
+            if wanted := beam.open_outputs(names) or (set() if names else asked):
                 _fit_neighbours(beam, beam.fits[names], library, wanted)
         new = set(beam.fits) - known
         if not new:
@@ -636,14 +639,15 @@ def _choose(beam: Beam, rounds: tuple[dict[str, float], ...]) -> Choice:
     """Return the best set with each effect's posterior probability and its alternatives.
 
     The probability of an effect is the sum over the sets with it, or with a law that contains it.
-    Where noise explains every output, no effect is an alternative, and the answer if it is one.
+    Where every output is within its noise, no effect is the answer unless its evidence is far
+    behind: noise that is not quite as modelled is explained by some effect.
     """
     ranked = beam.ranked()
     logs = np.array([beam.log(names) for names in ranked])
     weights = np.exp(logs - logs[0])
     weights /= weights.sum()
     best = beam.best if weights[0] > MOST else _determined(beam, ranked)
-    if beam.log(frozenset()) > logs[0] - RIVAL_GAIN and not beam.open_outputs(frozenset()):
+    if beam.log(frozenset()) > logs[0] - GIVEN_UP and not beam.open_outputs(frozenset()):
         best = frozenset()
     fitted = beam.fits[best]
     steps = []
