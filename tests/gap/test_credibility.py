@@ -156,6 +156,23 @@ def test_alternatives_that_are_certain_together_hold_their_share(
     assert verdict_of(choice, [stage], found, [budget]) == said
 
 
+@pytest.mark.parametrize(("linkage", "said"), [(1.3, "ambiguous"), (20.0, "unexplained")])
+def test_alternatives_hold_a_stage_beside_another_that_nothing_explains(
+    linkage: float, said: str
+) -> None:
+    """A pressure scale or a slope explained 1445 floors of 1445, beside a linkage at 1.3."""
+    slope: Any = SimpleNamespace(name="slope", stage="schedule")
+    steps = (SimpleNamespace(effect=slope, rivals=("scale",)),)
+    stages = [
+        StageResult("schedule", gap=9.0, settled=9.0, limit=BOUND, left=1.0, guilty=True),
+        StageResult("linkage", gap=linkage, settled=linkage, limit=BOUND, left=1.3, guilty=True),
+    ]
+    budget: Any = SimpleNamespace(stage="schedule", of={"slope": 1.0}.__getitem__)
+    found = [EffectResult("slope", "schedule", 0.49, ())]
+    choice: Any = SimpleNamespace(steps=steps, probability=0.5)
+    assert verdict_of(choice, stages, found, [budget]) == said
+
+
 @pytest.mark.parametrize(
     ("loader", "linkage", "probability", "said"),
     [

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
@@ -49,22 +49,21 @@ def verdict_of(
 
     An effect without alternative that is not certain counts as unexplained, since it may imitate
     a fault outside the library. `mostly`: residual structure remains, but the certain effects hold
-    at least `MOST` of every faulty stage's gap, or of all gaps together. If no structure remains,
-    alternatives that are certain together hold their share as well. With alternatives the verdict
-    is `ambiguous` if no set of effects has more than half of the probability, or an effect that has
-    them is not certain; but not if none of them is credible and the certain effects hold that
-    share.
+    at least `MOST` of every faulty stage's gap, or of all gaps together. Where no structure remains
+    in a stage, alternatives that are certain together hold their share as well. With alternatives
+    the verdict is `ambiguous` if no set of effects has more than half of the probability, or an
+    effect that has them is not certain; but not if none of them is credible and the certain effects
+    hold that share.
     """
-    faulty = [stage.name for stage in stages if stage.guilty]
+    faulty = [stage for stage in stages if stage.guilty]
     blamed = {step.effect.stage for step in choice.steps}
     sure = {effect.name for effect in effects if effect.probability >= CERTAIN}
-    open_ones = doubted(choice, effects)
-    remains = any(s.guilty and (s.name not in blamed or s.unexplained) for s in stages)
-    left = bool(open_ones) or remains
+    open_ones, together = doubted(choice, effects), one_is_certain(choice, effects)
+    remains = any(s.name not in blamed or s.unexplained for s in faulty)
     known = {one.stage: one for one in budget}
-    holding = sure if remains else one_is_certain(choice, effects)
-    held = all(_held(known.get(name), holding) >= MOST for name in faulty)
-    if left and not held and (open_ones or _held_together(stages, known, sure) < MOST):
+    shares = [_held(known.get(s.name), sure if s.unexplained else together) for s in faulty]
+    left, held = bool(open_ones) or remains, min(shares, default=1.0) >= MOST
+    if left and not held and (open_ones or _held_together(faulty, shares) < MOST):
         return "unexplained"
     if not choice.steps:
         # A stage within a large noise floor may hide a gap.
@@ -98,18 +97,15 @@ def _held(budget: StageBudget | None, effects: Collection[str]) -> float:
     return 0.0 if budget is None else sum(budget.of(name) for name in effects)
 
 
-def _held_together(
-    stages: Sequence[StageResult], known: Mapping[str, StageBudget], effects: Collection[str]
-) -> float:
+def _held_together(stages: Sequence[StageResult], shares: Sequence[float]) -> float:
     """Return the share that the effects explain of the gaps of all faulty stages together.
 
     A gap is weighted by its logarithm, since the noise floors of two stages have no common unit.
     A stage without an output of its own has the gap of its neighbours with the filed rig.
     """
-    each = {stage.name: stage.settled or stage.gap or 1.0 for stage in stages if stage.guilty}
-    sizes = {name: math.log(gap) for name, gap in each.items() if gap > 1.0}
-    held = sum(size * min(_held(known.get(name), effects), 1.0) for name, size in sizes.items())
-    return held / max(sum(sizes.values()), 1e-300)
+    sizes = [math.log(max(stage.settled or stage.gap or 1.0, 1.0)) for stage in stages]
+    held = sum(size * min(share, 1.0) for size, share in zip(sizes, shares, strict=True))
+    return held / max(sum(sizes), 1e-300)
 
 
 def settings_of(
