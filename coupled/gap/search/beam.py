@@ -106,7 +106,7 @@ class Beam:
         Return whether it is kept.
         """
         names = names_of(fitted.effects)
-        fitted, new = self.likelier(fitted)
+        new = evidence(self.problem, fitted, self.error)
 
         def rank(fit: Fit, known: Evidence) -> tuple[bool, float]:
             return is_admissible(self.problem, fit), known.log(self.counts)
@@ -117,21 +117,6 @@ class Beam:
         if kept:
             self.fits[names], self.known[names] = fitted, new
         return kept
-
-    def likelier(self, fitted: Fit) -> tuple[Fit, Evidence]:
-        """Return a fit, or the same with the nuisance parameters without effects, and its evidence.
-
-        Least squares count every frame, the evidence independent samples. Beside a large gap, a
-        nuisance parameter may therefore be fitted at a value that costs more evidence, by its prior
-        or in another output, than the effects gain. A fit with less evidence than the set without
-        effects may then have more with the nuisance parameters of that set.
-        """
-        new = evidence(self.problem, fitted, self.error)
-        if not len(self.counts) or new.log(self.counts) >= self.log(frozenset()):
-            return fitted, new
-        plain = self.problem.with_nuisances(fitted, self.without_effects.values)
-        other = evidence(self.problem, plain, self.error)
-        return (plain, other) if other.log(self.counts) > new.log(self.counts) else (fitted, new)
 
     def log(self, names: Names) -> float:
         """Return the log evidence of a set."""
@@ -204,7 +189,7 @@ class Beam:
 
     def log_of(self, fitted: Fit) -> float:
         """Return the log evidence of a fit, possibly not of this beam."""
-        return self.likelier(fitted)[1].log(self.counts)
+        return evidence(self.problem, fitted, self.error).log(self.counts)
 
     def behind(self, fitted: Fit) -> float:
         """Return the log evidence by which a fit, possibly not of this beam, is behind the best."""

@@ -130,19 +130,11 @@ class Problem:
     def within_tolerance(self, found: Fit) -> Fit:
         """Return a fit with its nuisance parameters clipped to their 95 % intervals."""
         ends = {key: NORMAL_95 * prior.sigma for key, prior in self.priors.items()}
-        clipped = {
-            key: min(max(found.values[key], prior.mean - ends[key]), prior.mean + ends[key])
-            for key, prior in self.priors.items()
-            if key in found.values
-        }
-        return self.with_nuisances(found, clipped)
-
-    def with_nuisances(self, found: Fit, given: Mapping[str, float]) -> Fit:
-        """Return a fit with the values of its nuisance parameters as in `given`, if it has them."""
         values, penalty = dict(found.values), dict[str, float]()
         for key, prior in self.priors.items():
             if key in values:
-                values[key] = given.get(key, values[key])
+                low, high = prior.mean - ends[key], prior.mean + ends[key]
+                values[key] = min(max(values[key], low), high)
                 penalty[key] = 0.5 * ((values[key] - prior.mean) / prior.sigma) ** 2
         rig = self.rig_of(found.effects, values)
         groups = {
