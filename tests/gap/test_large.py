@@ -31,6 +31,23 @@ def test_a_large_effect_is_named_with_its_size(name: str, tmp_path: Path) -> Non
         assert one.value == pytest.approx(value, rel=0.03), key
 
 
+@pytest.mark.parametrize(
+    ("filed", "bend", "limit"), [(0.0, 5e-6, 5e-4), (6e-5, 6e-5, 3e-3), (0.0, 2e-4, 6e-3)]
+)
+def test_a_bend_stiffens_at_any_scale(
+    tmp_path: Path, filed: float, bend: float, limit: float
+) -> None:
+    """At 0.15 mm it was a soft backlash; a filed bend with a limit had no effect beside 2.9."""
+    keys = ("loader.bend_m_per_N", "compensation.bend_m_per_N")
+    rig = nominal_rig(False).changed({f"controls.column.{key}": filed for key in keys})
+    true = {"bend_{d}_per_N": bend, "limit_{d}": limit}
+    record = made(tmp_path, rig, {"stiffening_bend": true}, 31, noisier=0.2)
+    (found,) = diagnose(rig, {"r": record}, "column").effects
+    assert (found.name, found.probability > 0.8) == ("stiffening_bend", True)
+    for one, value in zip(found.parameters, true.values(), strict=True):
+        assert one.value == pytest.approx(value, rel=0.05)
+
+
 @pytest.mark.slow
 def test_values_that_the_record_does_not_separate_are_no_doubt_of_the_law(tmp_path: Path) -> None:
     """Each interval of the servo's values contains the neutral value, but not all together."""

@@ -17,7 +17,7 @@ from coupled.gap.effects.effect import (
     switch,
     value,
 )
-from coupled.gap.effects.seen import MODES_Hz, modes
+from coupled.gap.effects.seen import MODES_Hz, modes, saturations
 from coupled.gap.thresholds import SETTING, YIELDING_ERROR
 
 SERVO = "loader.servo_frequency_Hz"
@@ -47,6 +47,7 @@ LINKAGE: tuple[Effect, ...] = (
         "linkage",
         (real_bend(1e-4), limit("limit_{d}", "loader.bend_limit_{d}", 1e-4, 1, 5e-3, 2e-2)),
         Signature("force", "bent"),
+        seen=saturations,
         contains=("bend",),
     ),
     one(

@@ -1,4 +1,4 @@
-"""Start values of effects, estimated from the residuals: hums, ripples, stops and modes.
+"""Start values of effects, estimated from the residuals: hums, ripples, stops, modes and bends.
 
 A ripple is a force proportional to sin or cos of 2π·δc/period. It moves δc by the loader's
 equation, m·r'' + c·r' + G·r = −F. The residual is regressed on this response for many periods, as
@@ -7,18 +7,20 @@ white; in the force, the equation would amplify noise at short periods.
 
 The bend of a lightly damped structure is linear in its coefficient, but nearly all of it is within
 its bandwidth, a share 2ζ of its frequency. The residual of a rigid structure is therefore regressed
-on the bend at frequencies that are one bandwidth apart.
+on the bend at frequencies that are one bandwidth apart. A stiffening bend is tried from one that is
+almost linear to one that is all limit.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from coupled.errors import InputError
 from coupled.gap.noise.lines import lines_in, tone_of
 from coupled.gap.noise.smooth import smoothed
 from coupled.gap.signals.output import Floats, Output
@@ -148,6 +150,7 @@ def _met(output: Output, rig: Rig, side: float) -> float | None:
 LIGHT = 0.05  # damping ratio of the modes that are tried; the fit starts there
 MODES_Hz = (0.5, 200.0)  # the slowest and fastest mode of a structure
 BEND = 1e-6  # d/N, of the modes that are tried; any will do, since the bend is linear in it
+SATURATED = (0.5, 1.0, 1.5, 2.0, 3.0, 5.0)  # K·F over the limit: from a slope of 0.8 to none
 
 
 def modes(outputs: Sequence[Output], rig: Rig, control: ControlName) -> list[dict[str, float]]:
@@ -156,14 +159,7 @@ def modes(outputs: Sequence[Output], rig: Rig, control: ControlName) -> list[dic
     Return none if no mode takes anything of it, such as without a force.
     """
     ours = [output for output in outputs if output.stage == "linkage"]
-    d = unit_of(control)
-    keys = [f"bend_{d}_per_N", "bend_frequency_Hz", "bend_damping_ratio"]
-
-    def left(*values: float) -> Floats:
-        paths = (f"controls.{control}.loader.{key}" for key in keys)
-        bent = with_values(rig, dict(zip(paths, values, strict=True)))
-        return np.concatenate([output.residual(bent, coarse=True) for output in ours])
-
+    left = _bent(ours, rig, control, "bend_frequency_Hz", "bend_damping_ratio")
     rigid = left(0.0, 0.0, 0.0) if ours else np.zeros(0)
     fastest_Hz = min([MODES_Hz[1], *(0.5 * output.frame_rate_Hz for output in ours)])
     apart = math.log(1.0 + 2.0 * LIGHT)
@@ -176,3 +172,48 @@ def modes(outputs: Sequence[Output], rig: Rig, control: ControlName) -> list[dic
             most, bend = along / math.sqrt(power), along / power
             found = [{"bend_{d}_per_N": bend, "frequency_Hz": frequency_Hz, "damping_ratio": LIGHT}]
     return found
+
+
+def saturations(
+    outputs: Sequence[Output], rig: Rig, control: ControlName
+) -> list[dict[str, float]]:
+    """Return bend, d/N, and limit, d, of the stiffening bend that leaves the smallest residual.
+
+    The largest deflection under the record's force, A, and its mean slope K follow from the linear
+    bend. If K·F is x limits at the largest force, the limit is A/tanh(x), and the bend at no force
+    K·x/tanh(x). Return none if no bend takes anything of the residual.
+    """
+    ours = [output for output in outputs if output.stage == "linkage"]
+    left = _bent(ours, rig, control, "bend_limit_{d}")
+    rigid = left(0.0, 0.0) if ours else np.zeros(0)
+    bent = (rigid - left(BEND, 0.0)) / BEND if ours else rigid
+    power, along = float(bent @ bent), float(bent @ rigid)
+    if along <= 0.0:
+        return []
+    floors = np.concatenate([np.full(len(output.measured), output.floor) for output in ours])
+    slope = along / power
+    largest = slope * float(np.max(np.abs(bent * floors)))
+    tried = [(x * slope / math.tanh(x), largest / math.tanh(x)) for x in SATURATED]
+
+    def power_left(one: tuple[float, float]) -> float:
+        try:
+            return float(np.sum(left(*one) ** 2))
+        except InputError:  # the rig's schedule has no gradient as stiff as this structure
+            return math.inf
+
+    bend, limit = min(tried, key=power_left)
+    return [{"bend_{d}_per_N": bend, "limit_{d}": limit}]
+
+
+def _bent(
+    outputs: Sequence[Output], rig: Rig, control: ControlName, *keys: str
+) -> Callable[..., Floats]:
+    """Return the residual of outputs as a function of the bend, d/N, and other loader keys."""
+    named = [one.replace("{d}", unit_of(control)) for one in ("bend_{d}_per_N", *keys)]
+
+    def left(*values: float) -> Floats:
+        paths = (f"controls.{control}.loader.{key}" for key in named)
+        bent = with_values(rig, dict(zip(paths, values, strict=True)))
+        return np.concatenate([output.residual(bent, coarse=True) for output in outputs])
+
+    return left

@@ -263,9 +263,8 @@ def _search_from(
     for fitted in (without_effects if over else known[0], *known[1:]):
         beam.add(fitted)
     beam.recount()
-    return beam, _search_by_depth(
-        beam, distinct(library, case.contact) if case.contact else list(library)
-    )
+    kept = distinct(library, case.contact) if case.contact else list(library)
+    return beam, _search_by_depth(beam, [one for one in kept if case.is_comparable(one)])
 
 
 def _search_by_depth(beam: Beam, library: Sequence[Effect]) -> tuple[dict[str, float], ...]:

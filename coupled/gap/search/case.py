@@ -129,6 +129,14 @@ class Case:
         """The nuisance parameters that the outputs depend on, by name; free in every fit."""
         return {name: one for name, one in self.known.items() if self.is_open(one)}
 
+    def is_comparable(self, effect: Effect) -> bool:
+        """Tell whether an effect on a value with a tolerance is compared with the tolerance alone.
+
+        A nuisance parameter whose outputs are within their noise is not fitted. The effect on the
+        same value would explain what the tolerance may.
+        """
+        return effect.name not in self.known or effect.name in self.settings
+
     def is_open(self, effect: Effect) -> bool:
         """Tell whether an output in which an effect shows has a residual above the noise."""
         return bool(self._above_noise & {*effect.shows_in})
