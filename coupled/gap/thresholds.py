@@ -125,6 +125,7 @@ NORMAL_95 = 1.96  # error rate: standard deviations to the end of a 95 % interva
 FIT_ITERATIONS = 40  # step; ablated
 EDGE_BISECTIONS = 30  # step: to 10⁻⁹ of the range
 COARSE_STEPS_Hz = 960.0  # step of the coarse phase; at 480 Hz 2 of 17 blind records were wrong
+SHOOTINGS = 10  # step: evaluations of a fit by multiple shooting; ablated
 DIFFERENCE = 0.3  # step: noise floors by which a difference changes the residual, above its jumps
 DIFFERENCE_STEPS = (1e-4, 0.1)  # step: bounds of a difference's step, of its scale; ablated
 DAMPING_FIRST, DAMPING_FACTOR = 0.01, 10.0  # step: Marquardt 1963

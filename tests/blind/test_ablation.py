@@ -16,9 +16,9 @@ from coupled.record.record import write_record
 from coupled.rig.rigwrite import rig_text
 from tests.support.ablated import newcombe, row, run
 from tests.support.gaps import made, nominal_rig
-from tests.support.rules import RULES, Rule, gives
+from tests.support.rules import RULES, Rule, idle
 
-ADDING = Rule("adding", "search.beam:_candidates", gives([]), "sets with one effect more")
+ADDING = Rule("adding", "search.beam:_fit_neighbours", idle, "sets with one effect more")
 FACTOR = 1.4
 
 

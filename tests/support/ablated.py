@@ -86,7 +86,7 @@ def shared(known: Known, searched: bool) -> Iterator[None]:
     plain_fit, plain_signatures = Problem.fit, screen._signatures
     plain_prepare, plain_search = module.prepare, module.search
     plain_evidence, plain_noise = beam.evidence, case_class.with_lower_noise
-    plain_colour = case_class.without_colour_allowance
+    plain_colour, plain_shots = case_class.without_colour_allowance, vars(case_class)["by_shots"]
 
     def fit(
         self: Problem,
@@ -131,6 +131,9 @@ def shared(known: Known, searched: bool) -> Iterator[None]:
         over = tuple(at for at, gap in gaps.items() if gap > limits[at])
         return known.of(("colour", id(self), over), self, lambda: plain_colour(self, root))
 
+    def shots(self: Any) -> Any:
+        return known.of(("shots", id(self)), self, lambda: plain_shots.func(self))
+
     def prepared(rig: Any, records: Any, part: Any, tell: Any, base: Any, *rest: Any) -> Any:
         def make() -> Any:
             return plain_prepare(rig, records, part, tell, base, *rest)
@@ -149,6 +152,7 @@ def shared(known: Known, searched: bool) -> Iterator[None]:
         patched(beam, "evidence", log_evidence),
         patched(case_class, "with_lower_noise", lower_noise),
         patched(case_class, "without_colour_allowance", colour),
+        patched(case_class, "by_shots", property(shots)),
         patched(module, "prepare", prepared),
         patched(module, "search", search),
         # Curves name no cause, and decide no verdict.

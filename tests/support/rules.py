@@ -44,6 +44,10 @@ def third(original: Original, first: Any, other: Any, argument: Any, *args: Any)
     return argument
 
 
+def idle(original: Original, *args: Any, **options: Any) -> None:
+    """Take the place of a rule that only adds fits to a beam."""
+
+
 def without_relief(original: Original, beam: Any, fitted: Fit, share: float = 1.0) -> Worth:
     """Return the worth of a candidate, without the penalty that it may remove."""
     return Worth(PRIOR_EFFECT + share * beam.behind(fitted), beam.counts)
@@ -87,6 +91,8 @@ RULES = (
          "laws of friction start from presliding parameters fitted before"),
     Rule("last_swaps", "search.beam:_sets_with_swap", gives([]),
          "swaps in the best set, at the end", "_fit_neighbours_of_best"),
+    Rule("two_for_one", "search.beam:_fit_with_simpler_law", gives(None),
+         "two effects of fewer parameters in place of a law of several"),
     Rule("relief", "search.beam:Beam.worth", without_relief,
          "screening deducts the nuisance parameters' penalty"),
     Rule("strained", "search.beam:relief_of", gives(0.0),
@@ -110,6 +116,8 @@ RULES = (
     Rule("grid", "search.case:contact_start",
          lambda original, cost, most, elastic: (LENGTHS[1] * most, 0.0),
          "presliding parameters start from a grid search", fresh=True),
+    Rule("shooting", "search.beam:_fit_by_multiple_shooting", idle,
+         "friction is also started from multiple shooting"),
     Rule("colour", "search.problem:Problem.without_colour_allowance", same,
          "a stage with a gap loses the allowance for unknown noise colour"),
     Rule("sensor_stamps", "search.case:Case._driven_over_limit", gives(()),
@@ -218,10 +226,16 @@ def _watching(rule: Rule, before: Any, acted: set[str]) -> Any:
     original = function_of(before)
 
     def call(*args: Any, **options: Any) -> Any:
+        fits = dict(args[0].fits) if rule.off is idle else {}
         result = original(*args, **options)
         if rule.name not in acted and called_by(rule.caller):
-            other = rule.off(lambda *_, **__: result, *args, **options)
-            if differs(result, other):
+            if rule.off is idle:
+                now = args[0].fits
+                changes = now.keys() != fits.keys() or any(now[k] is not fits[k] for k in now)
+            else:
+                other = rule.off(lambda *_, **__: result, *args, **options)
+                changes = differs(result, other)
+            if changes:
                 acted.add(rule.name)
         return result
 

@@ -10,8 +10,8 @@ has a log evidence (`evidence`). At each depth the neighbours of the best sets a
 
 The search ends when every stage is within its noise or no set is new. A fit of a neighbour starts
 from its parent's optimum, with the new parameters at a few sizes. The presliding parameters of dry
-friction start from a grid search. All starts are fitted for a few evaluations, and those far behind
-the best are dropped.
+friction start from a grid search; laws of friction are also started from a fit by multiple
+shooting. All starts are fitted for a few evaluations, and those far behind the best are dropped.
 """
 
 from __future__ import annotations
@@ -40,6 +40,7 @@ from coupled.gap.thresholds import (
     MOST,
     PRIOR_EFFECT,
     RIVAL_GAIN,
+    SHOOTINGS,
     TRIES,
     VERY_STRONG,
 )
@@ -51,7 +52,7 @@ Start = dict[str, float]
 Try = tuple[tuple[Effect, ...], Start, Fit]  # effects, start values, parent
 Started = tuple[float, Fit, Fit]  # log evidence, unfinished fit, parent
 COARSE, OWN = Descent("coarse"), Descent("own")
-FIRST = Descent("coarse", TRIES)
+FIRST, SHORT = Descent("coarse", TRIES), Descent("coarse", SHOOTINGS)
 
 
 def search_sets(case: Case, library: Sequence[Effect]) -> tuple[Case, Choice]:
@@ -286,6 +287,7 @@ def _search_by_depth(beam: Beam, library: Sequence[Effect]) -> tuple[dict[str, f
         if not new:
             break
         _finish(beam)
+        _fit_by_multiple_shooting(beam)
         depths.append((front[0], new))
         if beam.best == best:
             break
@@ -302,13 +304,23 @@ def _fit_neighbours_of_best(beam: Beam, library: Sequence[Effect]) -> None:
     """Fit the sets with one effect less than the best set, and with a nested law in its place.
 
     A set with one effect less starts at the optimum of the best set, also if it is known: its first
-    fit may have ended at a local minimum. Repeat while the best set changes.
+    fit may have ended at a local minimum. A law of several parameters may be equivalent to two
+    effects of fewer parameters, so they are fitted as well. Repeat while the best set changes.
     """
     while beam.best:
         best, fitted = beam.best, beam.fits[beam.best]
         fewer = [one for one in _sets_without_one(fitted) if one[0]]
         swapped = _sets_with_swap(beam, fitted, library)
         _fit_sets(beam, [*fewer, *swapped, *_sets_with_other_law(beam, fitted, library)])
+        for law in fitted.effects:
+            if (part := _fit_with_simpler_law(beam, law)) is not None:
+                beside = _candidates(part.effects, library, {*law.shows_in})
+                worth = Worth(PRIOR_EFFECT, beam.counts)
+                screened = beam.screen.best(part, beside, worth, TRIES)
+                _fit_sets(
+                    beam,
+                    [t for one in screened for t in _starts_with_one_more(beam, part, one)],
+                )
         _finish(beam)
         if beam.best == best:
             return
@@ -317,6 +329,22 @@ def _fit_neighbours_of_best(beam: Beam, library: Sequence[Effect]) -> None:
 def _numbers(fitted: Fit) -> int:
     """Return how many parameters a set's effects have."""
     return sum(len(effect.free) for effect in fitted.effects)
+
+
+def _fit_with_simpler_law(beam: Beam, law: Effect) -> Fit | None:
+    """Return the best fit with an effect of fewer parameters in place of a law of the best set.
+
+    Both show in the same output. Return None if the law has a single parameter, if there is no such
+    effect, or if its neighbours are fitted.
+    """
+    rest = beam.best - {law.name}
+    for names in beam.ranked() if len(law.free) > 1 else ():
+        if len(names) == len(beam.best) and rest < names:
+            (other,) = (one for one in beam.fits[names].effects if one.name not in rest)
+            if len(other.free) < len(law.free) and {*other.shows_in} & {*law.shows_in}:
+                grown = any(names < more for more in beam.fits)
+                return None if grown else beam.fits[names]
+    return None
 
 
 def _fit_neighbours(beam: Beam, fitted: Fit, library: Sequence[Effect], wanted: set[str]) -> None:
@@ -365,6 +393,30 @@ def _fit_neighbours(beam: Beam, fitted: Fit, library: Sequence[Effect], wanted: 
     if len(fitted.effects) > 1:
         others += [*_sets_with_swap(beam, fitted, library), *_sets_without_one(fitted)]
     _fit_sets(beam, others)
+
+
+def _fit_by_multiple_shooting(beam: Beam) -> None:
+    """Restart sets with dry friction from multiple shooting, if the loader is unexplained."""
+    short, best = beam.problem.by_shots, beam.fits[beam.best]
+    if short is None or "loader" not in beam.problem.over_limit(best.rig):
+        return
+    most = beam.log(beam.best)
+    dry = [
+        fit
+        for names, fit in beam.fits.items()
+        if any(e.dry for e in fit.effects)
+        and len(names) == len(beam.best)
+        and beam.log(names) > most - GIVEN_UP
+    ]
+
+    def shot(fitted: Fit) -> Start:
+        ours = {effect.value_key(p) for effect in fitted.effects for p in effect.free}
+        started = {key: value for key, value in fitted.values.items() if key in ours}
+        return dict(short.fit(fitted.effects, started, None, SHORT).values)
+
+    starts = in_threads(shot, dry)
+    _fit_sets(beam, [(f.effects, start, f) for f, start in zip(dry, starts, strict=True)])
+    _finish(beam)
 
 
 def _candidates(

@@ -152,6 +152,13 @@ class Case:
         return {output.stage for output in self.outputs if output.gap(self.nominal) > (1.0 + MINOR)}
 
     @cached_property
+    def by_shots(self) -> Case | None:
+        """The case with outputs predicted by multiple shooting; None if no output has it."""
+        if not any(output.shots for output in self.outputs):
+            return None
+        return replace(self, outputs=[output.by_shots() for output in self.outputs])
+
+    @cached_property
     def neutral(self) -> dict[str, float]:
         """The nuisance parameters' values in the rig file, by "effect.parameter"."""
         every = (*self.known.values(), *self.contact)

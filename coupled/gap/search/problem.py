@@ -154,6 +154,12 @@ class Problem:
         gaps, limits = stage_gaps(self.outputs, rig), stage_limits(self.outputs)
         return {at for at, gap in gaps.items() if gap > limits[at]}
 
+    @cached_property
+    def by_shots(self) -> Problem | None:
+        """The problem with outputs predicted by multiple shooting; None if no output has it."""
+        short = self.case.by_shots
+        return None if short is None else Problem(short)
+
     def model_error(self, without: Rig) -> ModelError:
         """Return the model error of each output: a share of the residual of a rig without effects.
 

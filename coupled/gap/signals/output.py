@@ -126,6 +126,7 @@ class Output:
     rough      an approximate prediction with fewer replays, for derivatives
     unsure     relative amount by which the floor may be too low, from the colour of input noise
     in_series  predicted from the force by loader and linkage in series
+    shots      prediction by multiple shooting: short replays, restarted as measured
     handed_on  part of the measurement that comes from the input; the rest is the stage's own motion
     errors     samples of the propagated error of the input; of one number in all of a record's
     lasts      autocorrelation time of the noise floor, frames, if its residual may not show it
@@ -148,6 +149,7 @@ class Output:
     rough: Predict | None = field(default=None, repr=False, compare=False)
     unsure: float = 0.0
     in_series: bool = False
+    shots: Predict | None = field(default=None, repr=False, compare=False)
     handed_on: Floats | None = field(default=None, repr=False, compare=False)
     errors: Sequence[Floats] = field(default=(), repr=False, compare=False)
     lasts: float = 1.0
@@ -182,6 +184,12 @@ class Output:
         """Return the output with `unsure` set for the noise of the signal that drives it."""
         more = noise.unsure * self.smoothed**2
         return replace(self, unsure=math.sqrt(1.0 + more) - 1.0, _known=[])
+
+    def by_shots(self) -> Output:
+        """Return the output predicted by multiple shooting, if it can be."""
+        if self.shots is None:
+            return self
+        return replace(self, predict=self.shots, rough=None, _known=[])
 
     @property
     def carried(self) -> float:

@@ -268,6 +268,11 @@ class Reader(Reading):
         between = driven(force.smooth, smooth, otherwise=True)(self.rig, 0.0)
         driven_by = DrivenBy("force", _rms(between - answer(self.rig, 0.0)))
         whole = self._made("loader", *made, driven_by, judged=self.judged).under(force.noise)
+        if not restarted:
+            every = self._restarts(round(PIECE_s * self.rig.frame_rate))
+            shot = driven(force.smooth, smooth, every)
+            shots = self._judged(lambda rig: shot(rig, 0.0), computed)
+            whole = replace(whole, shots=shots)
         if not walks:
             return [whole]
         return [replace(whole, rough=self._judged(lambda rig: answer(rig, 0.0), computed))]
