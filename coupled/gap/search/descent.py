@@ -71,8 +71,8 @@ class Slopes:
 
     Friction, breakout and play make the residual jump by small amounts: a difference over less is
     no derivative of the fit's cost. Far from the optimum the jumps are larger, and a step changes
-    the residual by at least a `share` of it. A `smooth` residual has no jumps, and its steps stay
-    small. `last` is the last Jacobian, possibly of another fit of the same parameters to the same
+    the residual by at least a `share` of it. A `smooth` residual has no jumps, and its steps do not
+    grow. `last` is the last Jacobian, possibly of another fit of the same parameters to the same
     frames. Columns of `held` without NaN are reused, shape (frames, parameters).
     """
 
@@ -133,9 +133,9 @@ class Slopes:
             there = x.copy()
             there[i] = value + (step if self._high[i] - value > step else -step)
             change = self._residual(there) - here
-            if not self._smooth:
-                growth = np.clip(wanted / max(_rms(change), 1e-9), 0.1, 10.0)
-                self._step[i] = float(np.clip(step * growth, *DIFFERENCE_STEPS))
+            most = 1.0 if self._smooth else 10.0
+            growth = np.clip(wanted / max(_rms(change), 1e-9), 0.1, most)
+            self._step[i] = float(np.clip(step * growth, *DIFFERENCE_STEPS))
             return np.asarray(change / (there[i] - value))
 
         return np.column_stack(in_threads(column, range(len(x))))
