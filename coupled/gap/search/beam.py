@@ -432,15 +432,11 @@ def _candidates(
 def _starts_with_one_more(beam: Beam, fitted: Fit, one: Screened) -> list[Try]:
     """Return the starts of a set with one effect more.
 
-    New dry friction starts at the presliding parameters fitted before (`Beam.contact`). Those of a
-    fitted set may have absorbed what the effect explains, and hold it in a local minimum: each
-    start is also made with them as filed.
+    New dry friction starts at the presliding parameters fitted before (`Beam.contact`).
     """
-    effects, filed = (*fitted.effects, one.effect), beam.problem.case.neutral
-    given = {**(beam.contact if one.effect.dry else {}), **fitted.values}
-    as_filed = {key: filed[key] for key in _contact_values(beam, fitted)}
-    begun = [given, given | as_filed] if as_filed else [given]
-    return [(effects, values | start, fitted) for values in begun for start in one.starts]
+    effects = (*fitted.effects, one.effect)
+    values = {**(beam.contact if one.effect.dry else {}), **fitted.values}
+    return [(effects, values | start, fitted) for start in one.starts]
 
 
 def _contact_values(beam: Beam, fitted: Fit) -> Start:
