@@ -59,6 +59,7 @@ from coupled.schema import changed, file_keys
 
 SPEED = "true_airspeed_m_per_s"
 ELEVATOR = surface_channel("column")
+FINER = {1e3: "milliseconds", 1e6: "microseconds", 1e9: "nanoseconds"}  # how many in a second
 
 
 def check_record(
@@ -79,9 +80,11 @@ def check_record(
     steps = np.diff(time)
     rate = 1.0 / float(np.median(steps))
     if abs(rate / rig.frame_rate - 1.0) > TINY:
-        raise InputError(
-            file, "time_s", f"runs at {rate:.4g} Hz, the rig at {rig.frame_rate:g} Hz: another rig?"
-        )
+        slower = rig.frame_rate / rate
+        unit = next((unit for n, unit in FINER.items() if abs(slower / n - 1.0) <= TINY), "")
+        asked = f"is it in {unit}?" if unit else "another rig?"
+        problem = f"runs at {rate:.4g} Hz, the rig at {rig.frame_rate:g} Hz: {asked}"
+        raise InputError(file, "time_s", problem)
     gap = np.flatnonzero(np.abs(steps * rig.frame_rate - 1.0) > NEGLIGIBLE)
     if gap.size:
         raise InputError(file, "time_s", f"has a gap or a jump after {time[gap[0]]:.3f} s")
@@ -394,13 +397,13 @@ def trim_speed(rig: Rig) -> float:
     """Return the true airspeed at which the rig's aircraft is trimmed, m/s."""
     assert rig.flight is not None
     still = changed(rig.flight, STILL, rig.name, "flight")
-    return _trim_speed(still.model_dump_json(), rig.frame_rate)
+    return _trim_speed(still.model_dump_json(), rig.frame_rate, rig.name)
 
 
 @lru_cache(maxsize=64)
-def _trim_speed(flight: str, rate_Hz: float) -> float:
+def _trim_speed(flight: str, rate_Hz: float, name: str) -> float:
     still = Flight.model_validate_json(flight)
-    airframe = make_aircraft(still, 1.0 / rate_Hz, ["column"], [aircraft_folder()])
+    airframe = make_aircraft(still, 1.0 / rate_Hz, ["column"], [aircraft_folder()], name)
     return airframe.motion()[motion_channels(["column"], flown=True).index(SPEED)]
 
 

@@ -173,6 +173,7 @@ def test_bad_records_are_refused_in_one_line(tmp_path: Path) -> None:
         (spoiled(good, time_s=lambda t: np.where(t > 20.0, t + 1.0, t)), "a gap or a jump after"),
         (spoiled(good, dynamic_pressure_Pa=lambda q: 0.0 * q), "it is stuck"),
         (spoiled(good, time_s=lambda t: t * 2.0), "another rig?"),
+        (spoiled(good, time_s=lambda t: t * 1000.0), "is it in milliseconds?"),
         (Record(good.channels, good.data[:400]), "5 s are needed"),
     ]
     for record, says in cases:

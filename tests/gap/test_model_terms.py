@@ -220,6 +220,15 @@ def test_terms_that_cannot_be_tried_are_refused(cessna: Rig, worn: Record, tmp_p
         diagnose(wrong, {"a.csv": motion}, terms=True)
 
 
+def test_a_term_that_the_model_lacks_is_refused_with_the_rigs_name(
+    cessna: Rig, worn: Record
+) -> None:
+    """It once was a fault of "rig", which no file is called."""
+    wrong = cessna.changed({"flight.terms.aero/coefficient/Clpp": 0.7})
+    with pytest.raises(InputError, match=r"^c172p: flight\.terms\..*did you mean .*Clp\?"):
+        diagnose(wrong, {"r": worn})
+
+
 def test_the_option_is_refused_for_a_folder_of_records(tmp_path: Path) -> None:
     done = command(tmp_path, "diagnose", ".", "--output", "out", "--terms")
     assert done.returncode == 2

@@ -189,8 +189,8 @@ def test_a_fit_is_not_dropped_for_what_its_nuisance_parameter_spoils() -> None:
 def test_an_effect_does_not_explain_what_a_tolerance_may(late_s: float) -> None:
     """The time stamps of a motion within its noise are not fitted, and 0.4 ms are tolerated.
 
-    They show in a loader with a bob weight too. Beside a friction, 0.4 ms of motion skew took 1.04
-    noise floors to 1.0, and had 0.89.
+    With a bob weight the time stamps show in the loader, too. Beside friction, 0.4 ms of motion
+    skew reduced 1.04 noise floors to 1.0, and was named with a probability of 0.89.
     """
 
     def loader(rig: Rig) -> Floats:

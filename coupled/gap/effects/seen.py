@@ -7,8 +7,8 @@ white; in the force, the equation would amplify noise at short periods.
 
 The bend of a lightly damped structure is linear in its coefficient, but nearly all of it is within
 its bandwidth, a share 2ζ of its frequency. The residual of a rigid structure is therefore regressed
-on the bend at frequencies that are one bandwidth apart. A stiffening bend is tried from one that is
-almost linear to one that is all limit.
+on the bend at frequencies that are one bandwidth apart. A stiffening bend is tried from almost
+linear to fully saturated.
 """
 
 from __future__ import annotations
@@ -181,7 +181,7 @@ def saturations(
 
     The largest deflection under the record's force, A, and its mean slope K follow from the linear
     bend. If K·F is x limits at the largest force, the limit is A/tanh(x), and the bend at no force
-    K·x/tanh(x). Return none if no bend takes anything of the residual.
+    K·x/tanh(x). Return none if no bend reduces the residual.
     """
     ours = [output for output in outputs if output.stage == "linkage"]
     left = _bent(ours, rig, control, "bend_limit_{d}")

@@ -198,7 +198,8 @@ class Scales:
     def times_columns(self, unit: str, control: ControlName) -> float:
         """Return the factor on a column's value by its unit; 1 for a machine of similar size.
 
-        The library's lengths are a column's in m. A wheel turns 0.3 rad where a column moves 0.03.
+        The library's lengths are those of a column in m, which moves 0.03 m where a wheel turns
+        0.3 rad.
         """
         powers = _powers(unit)
         if powers is None:

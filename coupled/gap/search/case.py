@@ -130,10 +130,10 @@ class Case:
         return {name: one for name, one in self.known.items() if self.is_open(one)}
 
     def is_comparable(self, effect: Effect) -> bool:
-        """Tell whether an effect on a value with a tolerance is compared with the tolerance alone.
+        """Tell whether a fit without an effect may use the tolerance of the effect's value, if any.
 
-        A nuisance parameter whose outputs are within their noise is not fitted. The effect on the
-        same value would explain what the tolerance may.
+        The nuisance parameter of a value is fitted only if one of its outputs exceeds the noise.
+        Otherwise the effect would be credited with what the tolerance explains.
         """
         return effect.name not in self.known or effect.name in self.settings
 

@@ -10,8 +10,8 @@ outputs, the effects' parameters θ and the nuisance parameters φ, a fit minimi
 q_o is the mean square of output o's residual, 1 at least, and τ_o its autocorrelation time in
 frames, both where the fit starts; records of one channel share their q_o, the mean over its frames,
 since their noise and misfit are of one machine. λ_o is the autocorrelation time of the noise floor
-(`Output.lasts`). An output that another effect disturbs weighs less, and so does one whose noise
-lasts: every frame is counted, but the speed after a wrong restart is one error, not hundreds.
+(`Output.lasts`). An output that another effect disturbs weighs less. So does an output with noise
+of long correlation: an error of the speed after a restart counts once, not in each of its frames.
 u is one unit of −2 log-likelihood, so the nuisance parameters' Gaussian priors, the second sum,
 weigh against the data as they do in a posterior. Fits run in several legs, so the weights follow
 the residual.

@@ -129,7 +129,7 @@ def _moves_itself(
 def filed_trim(rig: Rig, control: ControlName) -> float:
     """Return a surface's position in the trim to which `surface_points` refers, rad."""
     flight, controls, rate_Hz = _unaltered(rig)
-    return _trim(flight, controls, rate_Hz)[controls.index(control)]
+    return _trim(flight, controls, rate_Hz, rig.name)[controls.index(control)]
 
 
 def own_trim(rig: Rig, control: ControlName) -> float:
@@ -137,13 +137,16 @@ def own_trim(rig: Rig, control: ControlName) -> float:
     assert rig.flight is not None
     still = changed(rig.flight, STILL, rig.name, "flight")
     controls = flown_by(rig)
-    return _trim(still.model_dump_json(), controls, rig.frame_rate)[controls.index(control)]
+    each = _trim(still.model_dump_json(), controls, rig.frame_rate, rig.name)
+    return each[controls.index(control)]
 
 
 @lru_cache(maxsize=64)
-def _trim(flight: str, controls: tuple[ControlName, ...], rate_Hz: float) -> tuple[float, ...]:
+def _trim(
+    flight: str, controls: tuple[ControlName, ...], rate_Hz: float, name: str
+) -> tuple[float, ...]:
     still = Flight.model_validate_json(flight)
-    motion = make_aircraft(still, 1.0 / rate_Hz, controls, [aircraft_folder()]).motion()
+    motion = make_aircraft(still, 1.0 / rate_Hz, controls, [aircraft_folder()], name).motion()
     every = motion_channels(controls, flown=True)
     return tuple(motion[every.index(surface_channel(control))] for control in controls)
 
