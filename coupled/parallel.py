@@ -21,14 +21,17 @@ from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future,
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from dataclasses import dataclass, field
+from functools import partial
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import Any, TypeVar
 
 from coupled.errors import InputError, say_warning
+from coupled.turns import Turns, block_interruptions, turns
 
 MOST_WORKERS = 512  # processes: more than any machine has cores for
+_MOST_BESIDE = 3  # processes beside the threads of one piece of work, of 150 MB each
 _MOST_ON_WINDOWS = 61  # it waits for no more processes at once
 PATIENCE_s = 10.0
 _ATTENTIVE_s = 0.2  # a wait without end may not see an interruption before a job is done
@@ -50,6 +53,7 @@ class _Team:
     threads: int = 1
     places: threading.Semaphore = field(default_factory=lambda: threading.Semaphore(0))
     halt: threading.Event = field(default_factory=threading.Event)
+    turns: Turns = field(default_factory=Turns)
     above: _Team | None = None  # that within whose work this one works
 
     @property
@@ -71,12 +75,13 @@ def threads(count: int) -> Iterator[None]:
     """
     limits = importlib.import_module("threadpoolctl").threadpool_limits  # takes 20 ms to load
     most = cores(count)
-    before = _team.set(_Team(most, threading.Semaphore(most - 1)))
-    try:
-        with limits(1, "blas"):
+    beside = min(most - 1, _MOST_BESIDE) if guarded() else 0
+    with limits(1, "blas"), turns(beside) as places:
+        before = _team.set(_Team(most, threading.Semaphore(most - 1), turns=places))
+        try:
             yield
-    finally:
-        _team.reset(before)
+        finally:
+            _team.reset(before)
 
 
 def in_threads(work: Callable[[S], T], items: Sequence[S]) -> list[T]:
@@ -89,7 +94,7 @@ def in_threads(work: Callable[[S], T], items: Sequence[S]) -> list[T]:
     outer = _team.get()
     if outer.threads < 2 or len(items) < 2:
         return [work(item) for item in items]
-    team = _Team(outer.threads, outer.places, above=outer)
+    team = _Team(outer.threads, outer.places, turns=outer.turns, above=outer)
     todo, done = SimpleQueue[int](), dict[int, T]()
     faults: list[BaseException] = []
     for number in range(len(items)):
@@ -139,6 +144,11 @@ def _wait_for_all(helpers: Sequence[threading.Thread], places: threading.Semapho
         while helper.is_alive():
             helper.join(_ATTENTIVE_s)
     places.acquire()
+
+
+def in_turn(work: partial[T]) -> T:
+    """Return what `work` gives, which holds the interpreter and can be pickled (`Turns`)."""
+    return _team.get().turns.call(work)
 
 
 def go_on() -> None:
@@ -208,8 +218,7 @@ def _hand_over(
     is held would leave it locked, and the threads that end the executor would wait for it for
     ever. A worker that is begun here never gets one either.
     """
-    if hasattr(signal, "pthread_sigmask"):
-        signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    block_interruptions()
     while (arguments := todo.get()) is not None:
         try:
             future = pool.submit(work, *arguments)

@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from hashlib import sha256
 from typing import Any
 
@@ -40,6 +40,7 @@ from coupled.gap.stages.surfaces import (
 )
 from coupled.gap.stages.trim import trim_of
 from coupled.gap.thresholds import FAR, KNOWN, SHOT_TRIES
+from coupled.parallel import in_threads, in_turn
 from coupled.record.channels import LATERAL, ControlName, channel, motion_channels
 from coupled.record.record import Record
 from coupled.rig.parameters import Flight
@@ -149,12 +150,39 @@ class Model:
 
     def flown(self, rig: Rig) -> Flown | None:
         """Return the compared channels and the trim of `rig`; None if it cannot be trimmed."""
+        return self._flown(rig)[0]
+
+    def shots(self, rig: Rig) -> Floats | None:
+        """Return speed and pitch attitude with restarts; None if `rig` cannot be trimmed."""
+        flown = self._flown(rig)[1]
+        return None if flown is None else flown.motion[:, 1:]
+
+    def _flown(self, rig: Rig) -> list[Flown | None]:
+        """Return the flight of `rig`, and that with restarts if they are known.
+
+        The two are flown at once: what compares one of them compares the other too.
+        """
         assert rig.flight is not None
         flight = changed(rig.flight, {"motion_stamp_s": 0.0}, self.rig.name, "flight")
         # The air is estimated from the recorded motion, so it has the same late time stamps.
-        late = rig.flight.motion_stamp * self.rig.frame_rate if has_gusts(flight) else 0.0
-        asked = (flight, self.compared, _digest(self.moved), late)
-        return self.flights.of(asked, lambda: self.fly(flight, self.moved, late=late))
+        late = rig.flight.motion_stamp * self.rig.frame_rate
+        driven, states = _digest(self.moved), self.restarts
+
+        def plain() -> Flown | None:
+            moves = late if has_gusts(flight) else 0.0
+            asked = (flight, self.compared, driven, moves)
+            return self.flights.of(asked, lambda: self.fly(flight, self.moved, late=moves))
+
+        def restarted() -> Flown | None:
+            assert states is not None
+            return self.flights.of(
+                (flight, SLOW, driven, late),
+                lambda: self.fly(flight, self.moved, late=late, restarts=states.at(late)),
+            )
+
+        if states is None or is_throttled(self.record):
+            return [plain(), None]
+        return in_threads(lambda fly: fly(), [plain, restarted])
 
     def unknown_between(self, plain: Floats) -> Floats:
         """Return the change of the flight by another interpolation between the rows."""
@@ -163,17 +191,6 @@ class Model:
             return np.zeros_like(plain)
         flight = changed(self.rig.flight, {"motion_stamp_s": 0.0}, self.rig.name, "flight")
         return self.fly(flight, self.moved, between="spline").motion - plain
-
-    def shots(self, rig: Rig) -> Floats | None:
-        """Return speed and pitch attitude with restarts; None if `rig` cannot be trimmed."""
-        assert rig.flight is not None and self.restarts is not None
-        flight = changed(rig.flight, {"motion_stamp_s": 0.0}, self.rig.name, "flight")
-        late, states = rig.flight.motion_stamp * self.rig.frame_rate, self.restarts
-        asked = (flight, SLOW, _digest(self.moved), late)
-        flown = self.flights.of(
-            asked, lambda: self.fly(flight, self.moved, late=late, restarts=states.at(late))
-        )
-        return None if flown is None else flown.motion[:, 1:]
 
     def restarted(self) -> Floats:
         """Return the change of speed and attitude by restarts from the model's own states.
@@ -192,17 +209,16 @@ class Model:
         """Return the changes of speed and attitude by errors of surfaces, air and restarts."""
         assert self.rig.flight is not None and self.restarts is not None
         flight = changed(self.rig.flight, {"motion_stamp_s": 0.0}, self.rig.name, "flight")
-        flown = [
-            self.fly(flight, one, with_error=True, restarts=self.restarts.wrong(sample))
-            for sample, one in enumerate(wrong)
-        ]
+        restarts = [self.restarts.wrong(sample) for sample in range(len(wrong))]
+        given = list(zip(wrong, restarts, strict=True))
+        flown = in_threads(lambda one: self.fly(flight, one[0], True, restarts=one[1]), given)
         return [one.motion[:, 1:] - plain for one in flown]
 
     def carried(self, wrong: Sequence[Sequence[Moved]], plain: Floats) -> list[Floats]:
         """Return the changes of the flight by errors of the surfaces' motion and of the air."""
         assert self.rig.flight is not None
         flight = changed(self.rig.flight, {"motion_stamp_s": 0.0}, self.rig.name, "flight")
-        flown = [self.fly(flight, one, with_error=True) for one in wrong]
+        flown = in_threads(lambda one: self.fly(flight, one, with_error=True), wrong)
         return [one.motion - plain for one in flown]
 
     def fly(
@@ -228,7 +244,8 @@ class Model:
         given = (flight, rate_Hz, controls, moved, channels)
         known = flown_in(self.record, controls, rate_Hz)
         between = "held" if self.rig.controls else between
-        return fly_open_loop(*given, known, air=air, between_rows=between, restarts=restarts)
+        fly = partial(fly_open_loop, *given, known, air=air, between_rows=between)
+        return in_turn(partial(fly, restarts=restarts))
 
 
 def has_gusts(flight: Flight) -> bool:

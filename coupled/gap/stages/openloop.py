@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from threading import Lock
 from typing import Literal
 
 import numpy as np
@@ -41,7 +40,6 @@ Points = tuple[Floats, Floats]
 FlownIn = tuple[Sequence[Wrapper], Floats]
 Between = Literal["held", "pchip", "spline"]
 _SI = {"true_airspeed_m_per_s": FOOT_m, "altitude_m": FOOT_m}  # JSBSim has the others in SI
-_flying = Lock()  # JSBSim holds the GIL, so two flights at once would only alternate
 
 
 def command_of(position: Floats, points: Points) -> Floats:
@@ -136,27 +134,24 @@ def fly_open_loop(
     conditions: Sequence[Wrapper] = () if flown is None else flown[0]
     trims = None if flown is None else flown[1]
     gusts = Gusts(still, frame_s, air=air)
-    with _flying:
-        models = [aircraft_folder()]
-        airframe = make_aircraft(
-            still, frame_s, controls, models, conditions=conditions, gusts=gusts
-        )
-        start = dict(zip(motion_channels(controls, flown=True), airframe.motion(), strict=True))
-        trim = tuple(start[one.channel] for one in moved)
-        asked = np.zeros((len(moved[0].values) + 1, 3))
-        for i, (one, own) in enumerate(zip(moved, trim, strict=True)):
-            asked[:-1, i] = one.commands(own)
-            if trims is not None and one.points is not None:
-                asked[1:-1, i] -= trims[:-1, i]  # a row results from the frame before it
-        asked[-1] = asked[-2]
-        asked = asked[1:] if steps == 1 else _between(asked, steps, between_rows)
-        states = {row * steps: state for row, state in (restarts or {}).items()}
-        led = [
-            _Led(i, airframe.reader(PROPERTIES[one.channel]), one.gain)
-            for i, one in enumerate(moved)
-            if one.gain
-        ]
-        return Flown(_motion(airframe, asked, channels, states, led)[::steps], trim)
+    models = [aircraft_folder()]
+    airframe = make_aircraft(still, frame_s, controls, models, conditions=conditions, gusts=gusts)
+    start = dict(zip(motion_channels(controls, flown=True), airframe.motion(), strict=True))
+    trim = tuple(start[one.channel] for one in moved)
+    asked = np.zeros((len(moved[0].values) + 1, 3))
+    for i, (one, own) in enumerate(zip(moved, trim, strict=True)):
+        asked[:-1, i] = one.commands(own)
+        if trims is not None and one.points is not None:
+            asked[1:-1, i] -= trims[:-1, i]  # a row results from the frame before it
+    asked[-1] = asked[-2]
+    asked = asked[1:] if steps == 1 else _between(asked, steps, between_rows)
+    states = {row * steps: state for row, state in (restarts or {}).items()}
+    led = [
+        _Led(i, airframe.reader(PROPERTIES[one.channel]), one.gain)
+        for i, one in enumerate(moved)
+        if one.gain
+    ]
+    return Flown(_motion(airframe, asked, channels, states, led)[::steps], trim)
 
 
 @dataclass

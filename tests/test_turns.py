@@ -1,0 +1,87 @@
+"""Work that holds the interpreter: where it is done, its faults, and the end of its processes."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from collections.abc import Callable
+from functools import partial
+
+import pytest
+
+from coupled.errors import InputError
+from coupled.parallel import in_threads, in_turn, threads
+from coupled.turns import turns
+
+
+def where(_: int = 0) -> int:
+    time.sleep(0.02)
+    return os.getpid()
+
+
+def refused(number: int) -> int:
+    time.sleep(0.02)
+    raise InputError("a.toml", f"key{number}", "is wrong")
+
+
+def fallen(number: int) -> int:
+    """Return the number; a process beside the one that asked falls."""
+    time.sleep(0.02)
+    if os.getppid() == number:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return number
+
+
+def places(work: Callable[[int], int], number: int = 0) -> set[int]:
+    return set(in_threads(lambda _: in_turn(partial(work, number)), range(8)))
+
+
+def until_beside(seconds: float = 30.0) -> int:
+    """Work by two threads until a process beside this one has worked; return its number."""
+    until_s = time.monotonic() + seconds
+    while time.monotonic() < until_s:
+        if beside := places(where) - {os.getpid()}:
+            (number,) = beside
+            return number
+    raise AssertionError("no process has worked")
+
+
+def alive(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
+def test_a_call_that_would_wait_is_done_beside_by_a_process_that_ends_with_the_work() -> None:
+    with threads(2):
+        beside = until_beside()
+        assert places(where) == {os.getpid(), beside}
+        assert alive(beside)
+    assert not alive(beside)
+
+
+def test_one_thread_starts_no_process() -> None:
+    with threads(1):
+        assert places(where) == {os.getpid()}
+    with threads(2), turns(0) as none:
+        assert none.call(partial(where)) == os.getpid()
+
+
+def test_a_fault_is_raised_where_the_call_was_made() -> None:
+    with threads(2):
+        until_beside()
+        for _ in range(4):  # wherever it is done
+            with pytest.raises(InputError, match=r"a\.toml.*key3.*is wrong"):
+                places(refused, 3)
+        assert len(places(where)) == 2  # and what comes next has its own answer
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="not on this system")
+def test_the_call_of_a_process_that_falls_is_done_here() -> None:
+    with threads(2):
+        until_beside()
+        assert places(fallen, os.getpid()) == {os.getpid()}
+        assert places(where) == {os.getpid()}
