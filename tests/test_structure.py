@@ -39,6 +39,7 @@ ORDER = [
     "display",
     "files",
     "outputs",
+    "turns",
     "parallel",
     "schema",
     "arguments",
