@@ -37,6 +37,7 @@ from coupled.gap.thresholds import (
     KNOWN,
     PARTLY,
     RIVAL_GAIN,
+    ROUNDS,
     SHORT_FRAMES,
     SMALL,
     TRIM_ANSWERED,
@@ -63,7 +64,7 @@ def trim_of(rig: Rig, record: Record, control: ControlName) -> Trim | None:
     if name not in record or points is None:
         return None
     own, noise, first = own_trim(rig, control), white(record[name]), float(record[name][0])
-    off = _standing_off(rig, record, control)
+    off = _standing_off(rig, record, control, own)
     if off is None:  # by the rows before it moves
         start, error = _start_of(record[name][: max(2, round(BRIEF_s * rig.frame_rate))], noise)
         at = own if abs(start - own) <= TRIM_SIGMAS * error else start
@@ -79,6 +80,7 @@ def trim_of(rig: Rig, record: Record, control: ControlName) -> Trim | None:
         return both if flown is not None and flown > RIVAL_GAIN else plain
     if excluded:
         return both
+    there, error = _trimmed(rig, record, control, there)
     evidence = ((first - own) ** 2 - (first - there) ** 2) / max(noise, 1e-12) ** 2
     flown = _followed(rig, record, control, Trim(own, own, 0.0, standing), Trim(there, there, 0.0))
     in_trim = evidence > RIVAL_GAIN if flown is None else evidence + flown > -RIVAL_GAIN
@@ -103,8 +105,24 @@ def _start_of(position: Floats, noise: float) -> tuple[float, float]:
     return float(parabola(0.0)), 3.0 * noise / math.sqrt(rows)  # of the end of a parabola
 
 
-def _standing_off(rig: Rig, record: Record, control: ControlName) -> tuple[float, float] | None:
-    """Return a surface's initial offset from trim and command, and its standard error, rad.
+def _trimmed(rig: Rig, record: Record, control: ControlName, near: float) -> tuple[float, float]:
+    """Return a surface's position in the trim of an aircraft that trims `near` it, and its error.
+
+    A command moves the surface from there, by another amount than from the model's own trim if the
+    surface's travels are unequal. Both in rad.
+    """
+    found, error = near, math.inf
+    for _ in range(ROUNDS):
+        known = _standing_off(rig, record, control, found)
+        assert known is not None  # the record has the command
+        found, error = found + known[0], known[1]
+    return found, error
+
+
+def _standing_off(
+    rig: Rig, record: Record, control: ControlName, trim: float
+) -> tuple[float, float] | None:
+    """Return a surface's initial offset from a trim and command, and its standard error, rad.
 
     Shortfall and lag behind the command are fitted too; if the command moves at once, they would
     imitate another trim. The offset is estimated over the longest of `STANDING_s` from the record's
@@ -119,7 +137,7 @@ def _standing_off(rig: Rig, record: Record, control: ControlName) -> tuple[float
     served = service_rows(record, control)
     wanted = record[name] if served is None else served.asked
     measured = record[surface_channel(control)]
-    held = about(own_trim(rig, control), filed_trim(rig, control), points)
+    held = about(trim, filed_trim(rig, control), points)
     noise = estimate_noise(measured)
     crowded = (1.0 + noise.memory) / (1.0 - noise.memory)  # variance of a mean, over white noise's
     error = noise.rms * math.sqrt(crowded)
