@@ -66,6 +66,7 @@ BESIDE_BY = 6.0
 STEEPNESSES = (6.0, 8.0, 10.0, 12.0)  # step: exponents of the decay of a signal's spectrum; chosen
 LEVELS = tuple(-4.0 + 0.25 * k for k in range(48))  # step: ln of that signal's level; chosen
 LINE_HEIGHT = 30.0  # error rate: 10⁻⁹ for 7200 frames of white noise
+CORNER_FRAMES = (2, 4, 8, 16)  # step: to either side of a corner, which lies apart from others
 TAPER_BINS = 3  # step: bins to either side that a tone fills under a Hann window
 MAINS_Hz = (50.0, 60.0, 400.0)  # prior: mains of the ground, and of aircraft (MIL-STD-704)
 MAINS_OFF = 0.01  # tolerance: a public grid stays within 1 % for 99.5 % of a year (EN 50160)

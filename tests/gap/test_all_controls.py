@@ -145,14 +145,23 @@ def test_a_bench_has_no_airframe() -> None:
         # A part whose noise floor may hide a gap does not change what is known of another.
         ("ambiguous effect!", "effect"),
         ("ambiguous no_gap", "ambiguous"),
+        # A control that breakout and friction hold does not move: it is not judged.
+        ("still no_gap", "no_gap"),
+        ("still effect! no_gap", "effect"),
+        ("still ambiguous no_gap", "ambiguous"),
+        ("still still", "ambiguous"),
     ],
 )
 def test_no_part_hides_an_unexplained_one(parts: str, verdict: Verdict) -> None:
     """A faulty part is marked by !."""
-    each = [
-        SimpleNamespace(verdict=word.rstrip("!"), guilty=("loader",) if "!" in word else ())
-        for word in parts.split()
-    ]
+
+    def part(word: str) -> SimpleNamespace:
+        stage = SimpleNamespace(hidden=SimpleNamespace(still=word == "still"))
+        plain = word.rstrip("!").replace("still", "ambiguous")
+        hidden = (stage,) if word in ("still", "ambiguous") else ()
+        return SimpleNamespace(verdict=plain, guilty=("x",) if "!" in word else (), stages=hidden)
+
+    each = [part(word) for word in parts.split()]
     assert verdict_of_all(cast("list[Findings]", each)) == verdict
     assert verdict_of_all(cast("list[Findings]", each[::-1])) == verdict
 
@@ -170,6 +179,17 @@ def test_a_healthy_record_of_three_controls_has_no_gap() -> None:
     for stage in ("column.linkage", "wheel.linkage", "pedals.linkage", "airframe"):
         assert found.stage(stage).gap == pytest.approx(1.0, abs=0.15)
     json.dumps(table)
+
+
+def test_a_control_that_its_breakout_holds_is_not_judged_and_hides_no_gap() -> None:
+    """It was *ambiguous*: nothing of its loader shows, as of a control that no one touches."""
+    rig = noisy(package.load_rig("737"))
+    record = flown(rig, {}, SHORT_s, **JET_N | {"column": 20.0})
+    found = diagnose(rig, {"r": record})
+    assert found.verdict == "no_gap"
+    assert "the loader is not judged, as column_computed_m shows little but noise" in found.summary
+    assert "No gap in the wheel, pedals and airframe" in found.summary
+    assert diagnose(rig, {"r": record}, "column").verdict == "ambiguous"
 
 
 @pytest.mark.slow

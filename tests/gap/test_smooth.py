@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from coupled.gap.effects.library import BY_NAME
+from coupled.gap.noise.corners import corners_in
 from coupled.gap.noise.noise import Noise
 from coupled.gap.noise.smooth import Smoother, smoothed
 from coupled.gap.search.case import Case
@@ -87,3 +88,56 @@ def test_a_noise_as_large_as_the_signal_may_be_the_signal_and_lends_it_no_colour
     as_white = Smoother.of(broad, noise=Noise(1.0)).gain
     assert np.array_equal(Smoother.of(broad, noise=Noise(1.0, 0.48)).gain, as_white)
     assert np.array_equal(Smoother.of(broad).gain, as_white)
+
+
+def trapezoids(slope: float, at: float = 0.0) -> NDArray[np.float64]:
+    """Return a doublet and a 3-2-1-1 with ramps of 18 frames, from frame 600 + `at` on."""
+    frames, force = np.arange(2400.0), np.zeros(2400)
+    for first, height in ((600, 1.0), (720, -2.0), (840, 1.0), (1200, 1.0), (1560, -2.0)):
+        force += height * slope * np.clip(frames - first - at, 0.0, 18.0)
+    return force
+
+
+@given(
+    slope=st.floats(0.3, 3.0),
+    at=st.floats(0.0, 1.0),
+    noise=st.floats(0.0, 0.05),
+    seed=st.integers(0, 30),
+)
+def test_the_corners_of_a_script_are_seen_where_they_are(
+    slope: float, at: float, noise: float, seed: int
+) -> None:
+    true = trapezoids(slope, at)
+    read = true + noise * np.random.default_rng(seed).standard_normal(len(true))
+    turns = np.abs(np.diff(corners_in(read), 2))
+    sharp = np.abs(np.diff(true, 2)) > 0.2 * slope
+    beside = np.convolve(sharp, np.ones(5), mode="same") > 0.0
+    assert np.all(turns[~beside] < 0.3 * slope)
+    for frame in np.flatnonzero(sharp):
+        assert turns[max(frame - 2, 0) : frame + 3].sum() > 0.5 * slope
+
+
+def test_a_smoother_neither_rounds_a_corner_nor_rings_beside_it() -> None:
+    """It once overshot by 3.5 times the noise, and dry friction kept the peak."""
+    true, noise = trapezoids(2.4), 0.05
+    worst = []
+    for seed in range(8):
+        read = true + noise * np.random.default_rng(seed).standard_normal(len(true))
+        worst.append(float(np.max(np.abs(smoothed(read) - true))))
+    assert np.mean(worst) < 2.5 * noise
+
+
+@given(seed=st.integers(0, 40), noise=st.sampled_from([0.0, 0.001, 0.01]))
+def test_a_smooth_motion_has_no_corners(seed: int, noise: float) -> None:
+    read = pushes(seed, frames=2400)
+    read += noise * np.random.default_rng(seed).standard_normal(len(read))
+    assert not np.any(corners_in(read))
+
+
+@given(rounded=st.floats(6.0, 12.0), seed=st.integers(0, 20))
+def test_a_corner_that_a_servo_has_rounded_is_none(rounded: float, seed: int) -> None:
+    """Where the noise lets the rounding be seen."""
+    width = np.hanning(round(2.0 * rounded) + 1)
+    true = np.convolve(np.pad(trapezoids(2.4), 40, mode="edge"), width / width.sum(), mode="same")
+    read = true[40:-40] + 0.002 * np.random.default_rng(seed).standard_normal(2400)
+    assert not np.any(np.abs(np.diff(corners_in(read), 2)) > 0.3)

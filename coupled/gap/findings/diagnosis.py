@@ -7,7 +7,8 @@ verdict of the whole is that of the part that comes first in the order
 
 so that no effect of one part hides an unexplained stage of another. A part is ambiguous without a
 faulty stage if a noise floor hides whether it has a gap; this does not change the verdict on the
-gaps of other parts, as within one control.
+gaps of other parts, as within one control. A control that breakout and friction hold does not move,
+and is not judged; it changes no verdict on the others.
 """
 
 from __future__ import annotations
@@ -379,7 +380,13 @@ def verdict_of_all(parts: Sequence[Findings]) -> Verdict:
     found = next((verdict for verdict in _WORST if verdict in with_gap), None)
     if found is not None:
         return found
-    return "ambiguous" if any(part.verdict == "ambiguous" for part in parts) else "no_gap"
+    judged = [part for part in parts if not _stands_still(part)] or parts
+    return "ambiguous" if any(part.verdict == "ambiguous" for part in judged) else "no_gap"
+
+
+def _stands_still(part: Findings) -> bool:
+    """Tell whether breakout and friction held a control: its structure bends at most."""
+    return any(stage.hidden is not None and stage.hidden.still for stage in part.stages)
 
 
 @dataclass(frozen=True, kw_only=True)

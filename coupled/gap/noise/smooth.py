@@ -15,6 +15,9 @@ removes the noise. λ and n are from generalised cross-validation (Craven and Wa
 preserves sharp inputs. It assumes white noise, so the spectra are first divided by that of the
 noise's colour, and λ is scaled likewise. A line (`lines`), such as mains hum, is not noise: it is
 subtracted before and added again.
+
+So are corners, of a scripted input or of a motion at a stop: a smoother rounds one or rings beside
+it, and dry friction keeps the error of the peak.
 """
 
 from __future__ import annotations
@@ -28,7 +31,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from coupled.gap.noise.lines import Line, lines_in
+from coupled.gap.noise.corners import corners_in
+from coupled.gap.noise.lines import lines_in
 from coupled.gap.noise.noise import Floats, Noise, noise_of, noise_of_input
 from coupled.gap.thresholds import FEW_FRAMES, PIECE, SIGMAS, SMALL
 
@@ -135,7 +139,8 @@ class Smoother:
 
     gain: Floats  # H at each frequency of the extended signal
     reach: int  # frames by which a signal is extended at either end
-    lines: tuple[Line, ...] = ()
+    lines: Floats  # of the signal, and its corners: neither is smoothed; shapes (frames,)
+    corners: Floats
 
     @classmethod
     def of(
@@ -149,23 +154,31 @@ class Smoother:
         return _known(whole, tuple(orders), noise)
 
     def smooth(self, signal: Floats) -> Floats:
-        """Return a signal without its noise, same length, zero phase.
+        """Return the signal of the smoother without its noise, same shape, zero phase."""
+        kept = self.lines + self.corners
+        return self.passed(signal - kept) + kept
 
-        The signal is that of the smoother, or one with the same lines.
-        """
-        lines = sum(line.over(len(signal)) for line in self.lines)
-        long = _lengthened(signal - lines, self.reach)
+    def passed(self, noise: Floats) -> Floats:
+        """Return what passes of noise, same shape."""
+        long = _lengthened(noise, self.reach)
         drift = np.linspace(long[0], long[-1], len(long))
         out = drift + np.fft.irfft(np.fft.rfft(long - drift) * self.gain, len(long))
-        return np.asarray(out[self.reach : self.reach + len(signal)]) + lines
+        return np.asarray(out[self.reach : self.reach + len(noise)])
 
     def wiener_error(self, level: Noise, frames: int, rng: np.random.Generator) -> Floats:
         """Return a sample of the smoothing error, PSD H·Sₙ: noise passed and signal lost.
 
         It holds for a signal whose Wiener filter is this smoother; `level` is its noise.
         """
+        return self._sample(level, frames, rng, self.gain)
+
+    def lost(self, level: Noise, frames: int, rng: np.random.Generator) -> Floats:
+        """Return a sample of the signal that is lost, PSD H·(1 − H)·Sₙ."""
+        return self._sample(level, frames, rng, self.gain * (1.0 - self.gain))
+
+    def _sample(self, level: Noise, frames: int, rng: np.random.Generator, power: Floats) -> Floats:
         noise = level.sample(frames + 2 * self.reach, rng)
-        out = np.fft.irfft(np.fft.rfft(noise) * np.sqrt(self.gain), len(noise))
+        out = np.fft.irfft(np.fft.rfft(noise) * np.sqrt(power), len(noise))
         return np.asarray(out[self.reach : self.reach + frames])
 
 
@@ -173,12 +186,14 @@ class Smoother:
 def _known(signal: bytes, orders: tuple[int, ...], noise: Noise | None) -> Smoother:
     """Return the smoother of a signal, cached."""
     plain = np.frombuffer(signal)
-    lines = tuple(lines_in(plain))
+    lines = sum((line.over(len(plain)) for line in lines_in(plain)), np.zeros(len(plain)))
+    corners = corners_in(plain - lines)
+    rest = plain - lines - corners
     reach = min(len(plain) - 1, 200)
-    without = plain - sum(line.over(len(plain)) for line in lines)
-    gain = _gain(_lengthened(without, reach), orders, _colour(without, noise))
-    gain.flags.writeable = False
-    return Smoother(gain, reach, lines)
+    gain = _gain(_lengthened(rest, reach), orders, _colour(rest, noise))
+    for array in (gain, lines, corners):
+        array.flags.writeable = False
+    return Smoother(gain, reach, lines, corners)
 
 
 def _colour(signal: Floats, noise: Noise | None) -> float:

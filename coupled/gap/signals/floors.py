@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.gap.noise.noise import Noise, noise_of_input, quiet_noise
-from coupled.gap.noise.smooth import Rest, Smoother, rest_of, smoothed
+from coupled.gap.noise.smooth import Rest, Smoother, rest_of
 from coupled.gap.signals.output import Floats, estimate_noise, rounding
 from coupled.gap.thresholds import FEW_FRAMES, SHORT_FRAMES, SIGMAS, TINY
+from coupled.rig.nodes import on_nodes
 from coupled.rig.rig import Rig
 
 
@@ -79,7 +80,8 @@ def with_error(signal: Floats, k: int, level: Noise) -> Floats:
     """Return a smoothed signal with a sample of its error: noise passed and signal lost."""
     rng = np.random.default_rng([41, k])
     raw = signal + level.sample(len(signal), rng)
-    return signal + Smoother.of(raw, noise=level).wiener_error(level, len(signal), rng)
+    smoother = Smoother.of(raw, noise=level)
+    return smoother.smooth(raw) + smoother.lost(level, len(signal), rng)
 
 
 def unsmoothed(signal: Floats, k: int, level: Noise) -> Floats:
@@ -132,12 +134,13 @@ def _regressed(signal: Floats, onto: Floats, delays: range) -> tuple[float, floa
 
 @dataclass(frozen=True)
 class Drive:
-    """A signal that drives a stage: as recorded, as used for input, its noise and its rests."""
+    """A signal that drives a stage: as recorded and as used, its noise, rests and corners."""
 
     recorded: Floats
     smooth: Floats
     noise: Noise
     rest: Rest
+    corners: Floats
 
     @classmethod
     def of(cls, signal: Floats, noise: Noise) -> Drive:
@@ -147,10 +150,20 @@ class Drive:
         signal, for example of a hand that moves in steps.
         """
         rest = rest_of(signal, noise)
-        smooth = rest.held(smoothed(signal, noise)) if noise.rms else signal
-        made = cls(signal, smooth, noise, rest)
+        smoother = Smoother.of(signal, noise=noise)
+        smooth = rest.held(smoother.smooth(signal)) if noise.rms else signal
+        made = cls(signal, smooth, noise, rest, smoother.corners)
         taken = float(np.sqrt(np.mean((signal - smooth) ** 2)))
         return made.unsmoothed(noise) if taken > SIGMAS * noise.rms else made
+
+    def on_nodes(self, rig: Rig, samples: Floats) -> Floats:
+        """Return this signal, or one with other errors, on the loader's nodes.
+
+        A spline rings beside corners; they are joined by straight lines.
+        """
+        at = np.arange((len(samples) - 1) * rig.substeps + 1) / rig.substeps
+        corners = np.interp(at, np.arange(len(samples)), self.corners)
+        return on_nodes(rig, samples - self.corners) + corners
 
     def unsmoothed(self, noise: Noise) -> Drive:
         """Return the signal as recorded, without smoothing."""
@@ -167,4 +180,4 @@ class Drive:
     def passed(self, rng: np.random.Generator) -> Floats:
         """Return a sample of the noise that passes the smoother, shape (frames,)."""
         sample = self.noise.sample(len(self.recorded), rng)
-        return self.rest.beside(Smoother.of(self.recorded, noise=self.noise).smooth(sample))
+        return self.rest.beside(Smoother.of(self.recorded, noise=self.noise).passed(sample))

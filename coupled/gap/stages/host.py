@@ -104,7 +104,7 @@ class Product:
         """
         rest = self._computed - self._smooth
         noise = self._level.sample(len(rest), np.random.default_rng(53))
-        alone = noise - Smoother.of(self._computed).smooth(noise)
+        alone = noise - Smoother.of(self._computed).passed(noise)
         power = float(rest @ rest)
         motion = max(0.0, 1.0 - float(alone @ alone) / power) if power > 0.0 else 0.0
         return self._smooth + motion * rest

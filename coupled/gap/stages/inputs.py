@@ -206,7 +206,7 @@ class Series:
 
     def _driven(self, force: Floats) -> Driven:
         """Return the response to a force, N at the frames, plus a multiple of its noise."""
-        reading, nodes = self._reading, Nodes(force)
+        reading, nodes = self._reading, Nodes(force, self.force.on_nodes)
 
         def at(rig: Rig, times: float) -> Floats:
             sensed = reading.sensed(rig)
