@@ -13,11 +13,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.gap.noise.noise import Noise, noise_of_input, quiet_noise
+from coupled.gap.noise.noise import Noise, jumps, noise_of_input, quiet_noise
 from coupled.gap.noise.smooth import Rest, Smoother, rest_of
 from coupled.gap.signals.output import Floats, estimate_noise, rounding
 from coupled.gap.thresholds import FEW_FRAMES, SHORT_FRAMES, SIGMAS, TINY
-from coupled.rig.nodes import on_nodes
+from coupled.rig.nodes import coarsely, on_nodes
 from coupled.rig.rig import Rig
 
 
@@ -156,14 +156,16 @@ class Drive:
         taken = float(np.sqrt(np.mean((signal - smooth) ** 2)))
         return made.unsmoothed(noise) if taken > SIGMAS * noise.rms else made
 
-    def on_nodes(self, rig: Rig, samples: Floats) -> Floats:
+    def on_nodes(self, rig: Rig, samples: Floats, otherwise: bool = False) -> Floats:
         """Return this signal, or one with other errors, on the loader's nodes.
 
-        A spline rings beside corners; they are joined by straight lines.
+        A spline rings beside corners; they are joined by straight lines. `otherwise`: a signal that
+        jumps is interpolated more coarsely, for the error of the interpolation.
         """
         at = np.arange((len(samples) - 1) * rig.substeps + 1) / rig.substeps
         corners = np.interp(at, np.arange(len(samples)), self.corners)
-        return on_nodes(rig, samples - self.corners) + corners
+        rest = samples - self.corners
+        return (coarsely if otherwise and jumps(rest) else on_nodes)(rig, rest) + corners
 
     def unsmoothed(self, noise: Noise) -> Drive:
         """Return the signal as recorded, without smoothing."""

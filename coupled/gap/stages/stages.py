@@ -23,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.gap.noise.noise import Noise, between_jumps, jumps
+from coupled.gap.noise.noise import Noise, between_jumps
 from coupled.gap.noise.smooth import rate_of, smoothed
 from coupled.gap.signals.conditions import reach_of, trim_shift
 from coupled.gap.signals.floors import (
@@ -65,7 +65,7 @@ from coupled.gap.thresholds import (
 )
 from coupled.parallel import in_threads
 from coupled.rig.hosted import Hosted
-from coupled.rig.nodes import Nodes, coarsely
+from coupled.rig.nodes import Nodes
 from coupled.rig.replay import (
     drive_linkage,
     drive_loader,
@@ -219,7 +219,7 @@ class Reader(Reading):
             `otherwise`: force and services between the frames are interpolated more coarsely.
             """
             starts = own_starts if starts is None else starts
-            nodes = Nodes(f, coarsely if otherwise and jumps(f) else force.on_nodes)
+            nodes = Nodes(f, partial(force.on_nodes, otherwise=otherwise))
             misread = computed - seen
             rate = rate_of(seen, self.rig.frame_rate) if starts.any() else seen
 
@@ -355,7 +355,7 @@ class Reader(Reading):
         noise = Nodes(command.passed(rng)), force.passed(rng)
 
         def driven(c: Floats, f: Floats, otherwise: bool = False) -> Predict:
-            nodes = Nodes(c, coarsely if otherwise and jumps(c) else command.on_nodes)
+            nodes = Nodes(c, partial(command.on_nodes, otherwise=otherwise))
 
             def at(rig: Rig, times: float) -> Floats:
                 sensed, moved, pulled = self.sensed(rig), nodes.of(rig), f
