@@ -98,6 +98,10 @@ def trapezoids(slope: float, at: float = 0.0) -> NDArray[np.float64]:
     return force
 
 
+def polygon(signal: NDArray[np.float64]) -> NDArray[np.float64]:
+    return corners_in(signal).over(np.arange(len(signal), dtype=np.float64))
+
+
 @given(
     slope=st.floats(0.3, 3.0),
     at=st.floats(0.0, 1.0),
@@ -109,7 +113,7 @@ def test_the_corners_of_a_script_are_seen_where_they_are(
 ) -> None:
     true = trapezoids(slope, at)
     read = true + noise * np.random.default_rng(seed).standard_normal(len(true))
-    turns = np.abs(np.diff(corners_in(read), 2))
+    turns = np.abs(np.diff(polygon(read), 2))
     sharp = np.abs(np.diff(true, 2)) > 0.2 * slope
     beside = np.convolve(sharp, np.ones(5), mode="same") > 0.0
     assert np.all(turns[~beside] < 0.3 * slope)
@@ -123,7 +127,9 @@ def test_a_smoother_neither_rounds_a_corner_nor_rings_beside_it() -> None:
     worst = []
     for seed in range(8):
         read = true + noise * np.random.default_rng(seed).standard_normal(len(true))
-        worst.append(float(np.max(np.abs(smoothed(read) - true))))
+        worst.append(
+            float(np.max(np.abs(Smoother.of(read, with_corners=True).smooth(read) - true)))
+        )
     assert np.mean(worst) < 2.5 * noise
 
 
@@ -131,7 +137,7 @@ def test_a_smoother_neither_rounds_a_corner_nor_rings_beside_it() -> None:
 def test_a_smooth_motion_has_no_corners(seed: int, noise: float) -> None:
     read = pushes(seed, frames=2400)
     read += noise * np.random.default_rng(seed).standard_normal(len(read))
-    assert not np.any(corners_in(read))
+    assert corners_in(read).each == ()
 
 
 @given(rounded=st.floats(6.0, 12.0), seed=st.integers(0, 20))
@@ -140,4 +146,4 @@ def test_a_corner_that_a_servo_has_rounded_is_none(rounded: float, seed: int) ->
     width = np.hanning(round(2.0 * rounded) + 1)
     true = np.convolve(np.pad(trapezoids(2.4), 40, mode="edge"), width / width.sum(), mode="same")
     read = true[40:-40] + 0.002 * np.random.default_rng(seed).standard_normal(2400)
-    assert not np.any(np.abs(np.diff(corners_in(read), 2)) > 0.3)
+    assert not np.any(np.abs(np.diff(polygon(read), 2)) > 0.3)

@@ -1,37 +1,60 @@
-"""Corners of a signal: of a scripted input, or of a motion at a stop.
+"""The corners of a force that a script or a test stand gives.
 
 A smoother rounds a corner or rings beside it, by several times the noise, and dry friction keeps
 the error of the peak. Corners are therefore found, taken out before a signal is smoothed, and added
 again (`smooth`).
 
 A corner is a change of slope, far above those elsewhere in the signal, that is as large over few
-frames as over many. That of a bend grows with the frames.
+frames as over many; that of a bend grows with the frames. Two straight lines that meet at it leave
+noise alone.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.ndimage import maximum_filter1d
 
 from coupled.gap.noise.noise import Floats
-from coupled.gap.thresholds import CORNER_FRAMES, FAR_SIGMAS, PARTLY, SIGMAS
+from coupled.gap.thresholds import (
+    CORNER_FRAMES,
+    DOUBLED,
+    FAR_SIGMAS,
+    PARTLY,
+    ROUNDING_SPAN,
+    SIGMAS,
+)
 
-_BESIDE = (-1, 0, 1)  # a corner between two frames is one in each
+
+@dataclass(frozen=True)
+class Corners:
+    """Changes of slope, each by a size in the signal's unit a frame at a time in frames."""
+
+    each: tuple[tuple[float, float], ...] = ()
+
+    def over(self, frames: Floats) -> Floats:
+        """Return the polygon of the corners, zero before the first, at times in frames."""
+        found = np.zeros(len(frames))
+        for time, size in self.each:
+            found += size * np.maximum(frames - time, 0.0)
+        return found
 
 
-def corners_in(signal: Floats) -> Floats:
-    """Return the polygon of a signal's corners, zero before the first; same shape.
+def corners_in(signal: Floats) -> Corners:
+    """Return the corners of a signal, in their order.
 
-    Corners that a few frames show are taken out first, since others may lie beside them. At the end
+    Those that a few frames show are taken out first, since others may lie beside them. At the end
     each is fitted again, up to the next corner.
     """
-    corners = dict[int, Floats]()
+    frames, corners = np.arange(len(signal), dtype=np.float64), dict[int, tuple[float, float]]()
+    noise = float(np.median(np.abs(np.diff(signal, 2)))) / 0.6745 / math.sqrt(6.0)
+    noise = max(noise, ROUNDING_SPAN * float(np.ptp(signal)))
     for most in CORNER_FRAMES[1:]:
         if len(signal) < 4 * most:
             break
-        rest = signal - _polygon(corners, len(signal))
+        rest = signal - Corners(tuple(corners.values())).over(frames)
         seen = [reach for reach in CORNER_FRAMES if reach <= most]
         turns = {reach: _turns(rest, reach) for reach in seen}
         usual = {n: float(np.median(np.abs(turn))) / 0.6745 for n, turn in turns.items()}
@@ -42,28 +65,17 @@ def corners_in(signal: Floats) -> Floats:
             least = (1.0 - PARTLY) * size - doubt
             sharp &= turns[reach] * np.sign(turns[most]) >= least
         for at in (np.flatnonzero(sharp[most:-most]) + most).tolist():
-            if all(abs(at - other) >= CORNER_FRAMES[1] for other in corners):
-                corners[at] = _corner(rest[at - most : at + most + 1])
-    rest = signal - _polygon(corners, len(signal))
+            apart = all(abs(at - other) >= CORNER_FRAMES[1] for other in corners)
+            found = _corner(rest, at, most, noise) if apart else None
+            if found is not None:
+                corners[at] = found
+    rest, kept = signal - Corners(tuple(corners.values())).over(frames), list[tuple[float, float]]()
     ends = [0, *sorted(corners), len(signal) - 1]
     for before, at, after in zip(ends, ends[1:], ends[2:], strict=False):
-        reach = min(at - before, after - at, CORNER_FRAMES[-1])
-        own = _hinges(reach) @ corners[at]
-        corners[at] = _corner(rest[at - reach : at + reach + 1] + own)
-    return _polygon(corners, len(signal))
-
-
-def _polygon(corners: Mapping[int, Floats], frames: int) -> Floats:
-    """Return the sum of corners, given by their changes of slope about their frames."""
-    turns = np.zeros(frames)
-    for at, sizes in corners.items():
-        turns[at - 1 : at + 2] += sizes
-    return np.concatenate(([0.0], np.cumsum(np.cumsum(turns))[:-1]))
-
-
-def _hinges(reach: int) -> Floats:
-    """Return unit changes of slope in the frames `_BESIDE` a window's middle, shape (frames, 3)."""
-    return np.maximum(np.arange(-reach, reach + 1.0)[:, None] - _BESIDE, 0.0)
+        own = rest + Corners((corners[at],)).over(frames)
+        found = _corner(own, at, min(at - before, after - at, CORNER_FRAMES[-1]), noise)
+        kept += [corners[at] if found is None else found]
+    return Corners(tuple(kept))
 
 
 def _turns(signal: Floats, reach: int) -> Floats:
@@ -78,17 +90,16 @@ def _turns(signal: Floats, reach: int) -> Floats:
     return found
 
 
-def _corner(window: Floats) -> Floats:
-    """Return the changes of slope of the corner in the middle of a window, shape (3,)."""
-    reach = len(window) // 2
-    hinges, best = _hinges(reach), (np.inf, np.zeros(3))
-    line = np.column_stack([np.ones(len(window)), np.arange(-reach, reach + 1.0)])
-    for columns in ([1], [0, 1], [1, 2]):
-        given = np.hstack([line, hinges[:, columns]])
+def _corner(signal: Floats, at: int, reach: int, noise: float) -> tuple[float, float] | None:
+    """Return time and size of the corner within a frame of the given one; None if it is none."""
+    near, best = np.arange(-reach, reach + 1.0), (np.inf, (0.0, 0.0))
+    window = signal[at - reach : at + reach + 1]
+    line = np.column_stack([np.ones(len(near)), near])
+    for places in ([0], [-1, 0], [0, 1]):
+        given = np.hstack([line, np.maximum(near[:, None] - places, 0.0)])
         found = np.linalg.lstsq(given, window, rcond=None)[0]
-        left = float(np.sum((window - given @ found) ** 2))
-        if found[2] * found[-1] > 0.0 and left < best[0]:
-            sizes = np.zeros(3)
-            sizes[columns] = found[2:]
-            best = left, sizes
-    return best[1]
+        left, sizes = float(np.sum((window - given @ found) ** 2)), found[2:]
+        if sizes[0] * sizes[-1] > 0.0 and left < best[0]:
+            size = float(np.sum(sizes))
+            best = left, (at + float(np.dot(places, sizes)) / size, size)
+    return best[1] if best[0] <= (DOUBLED * noise) ** 2 * len(near) else None

@@ -16,8 +16,8 @@ preserves sharp inputs. It assumes white noise, so the spectra are first divided
 noise's colour, and λ is scaled likewise. A line (`lines`), such as mains hum, is not noise: it is
 subtracted before and added again.
 
-So are corners, of a scripted input or of a motion at a stop: a smoother rounds one or rings beside
-it, and dry friction keeps the error of the peak.
+So are the corners of a scripted force: a smoother rounds one or rings beside it, and dry friction
+keeps the error of the peak.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from coupled.gap.noise.corners import corners_in
+from coupled.gap.noise.corners import Corners, corners_in
 from coupled.gap.noise.lines import lines_in
 from coupled.gap.noise.noise import Floats, Noise, noise_of, noise_of_input
 from coupled.gap.thresholds import FEW_FRAMES, PIECE, SIGMAS, SMALL
@@ -139,23 +139,28 @@ class Smoother:
 
     gain: Floats  # H at each frequency of the extended signal
     reach: int  # frames by which a signal is extended at either end
-    lines: Floats  # of the signal, and its corners: neither is smoothed; shapes (frames,)
-    corners: Floats
+    lines: Floats  # of the signal, shape (frames,), and its corners: neither is smoothed
+    corners: Corners
 
     @classmethod
     def of(
-        cls, signal: Floats, orders: Sequence[int] = (3, 2, 1), noise: Noise | None = None
+        cls,
+        signal: Floats,
+        orders: Sequence[int] = (3, 2, 1),
+        noise: Noise | None = None,
+        with_corners: bool = False,
     ) -> Smoother:
         """Return the best smoother of a signal, with differences of one of these orders.
 
-        `noise` gives the colour of the noise; by default it is estimated from the signal.
+        `noise` gives the colour of the noise; by default it is estimated from the signal. A signal
+        may have corners (`corners`) if it is no motion of a mass.
         """
         whole = np.ascontiguousarray(signal, dtype=np.float64).tobytes()
-        return _known(whole, tuple(orders), noise)
+        return _known(whole, tuple(orders), noise, with_corners)
 
     def smooth(self, signal: Floats) -> Floats:
         """Return the signal of the smoother without its noise, same shape, zero phase."""
-        kept = self.lines + self.corners
+        kept = self.lines + self.corners.over(np.arange(len(signal), dtype=np.float64))
         return self.passed(signal - kept) + kept
 
     def passed(self, noise: Floats) -> Floats:
@@ -183,15 +188,17 @@ class Smoother:
 
 
 @lru_cache(maxsize=_REMEMBERED)
-def _known(signal: bytes, orders: tuple[int, ...], noise: Noise | None) -> Smoother:
+def _known(
+    signal: bytes, orders: tuple[int, ...], noise: Noise | None, with_corners: bool
+) -> Smoother:
     """Return the smoother of a signal, cached."""
     plain = np.frombuffer(signal)
     lines = sum((line.over(len(plain)) for line in lines_in(plain)), np.zeros(len(plain)))
-    corners = corners_in(plain - lines)
-    rest = plain - lines - corners
+    corners = corners_in(plain - lines) if with_corners else Corners()
+    rest = plain - lines - corners.over(np.arange(len(plain), dtype=np.float64))
     reach = min(len(plain) - 1, 200)
     gain = _gain(_lengthened(rest, reach), orders, _colour(rest, noise))
-    for array in (gain, lines, corners):
+    for array in (gain, lines):
         array.flags.writeable = False
     return Smoother(gain, reach, lines, corners)
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from coupled.gap.noise.corners import Corners
 from coupled.gap.noise.noise import Noise, jumps, noise_of_input, quiet_noise
 from coupled.gap.noise.smooth import Rest, Smoother, rest_of
 from coupled.gap.signals.output import Floats, estimate_noise, rounding
@@ -76,11 +77,11 @@ def _no_less(found: Noise, signal: Floats) -> Noise:
     return replace(found, rms=max(found.rms, rounding(signal, rough)))
 
 
-def with_error(signal: Floats, k: int, level: Noise) -> Floats:
+def with_error(signal: Floats, k: int, level: Noise, with_corners: bool = False) -> Floats:
     """Return a smoothed signal with a sample of its error: noise passed and signal lost."""
     rng = np.random.default_rng([41, k])
     raw = signal + level.sample(len(signal), rng)
-    smoother = Smoother.of(raw, noise=level)
+    smoother = Smoother.of(raw, noise=level, with_corners=with_corners)
     return smoother.smooth(raw) + smoother.lost(level, len(signal), rng)
 
 
@@ -140,17 +141,17 @@ class Drive:
     smooth: Floats
     noise: Noise
     rest: Rest
-    corners: Floats
+    corners: Corners
 
     @classmethod
-    def of(cls, signal: Floats, noise: Noise) -> Drive:
+    def of(cls, signal: Floats, noise: Noise, with_corners: bool = False) -> Drive:
         """Return a signal smoothed, and held constant at rest; unchanged if it has no noise.
 
         It is also unchanged if the smoother would remove far more than its noise, since that is
         signal, for example of a hand that moves in steps.
         """
         rest = rest_of(signal, noise)
-        smoother = Smoother.of(signal, noise=noise)
+        smoother = Smoother.of(signal, noise=noise, with_corners=with_corners)
         smooth = rest.held(smoother.smooth(signal)) if noise.rms else signal
         made = cls(signal, smooth, noise, rest, smoother.corners)
         taken = float(np.sqrt(np.mean((signal - smooth) ** 2)))
@@ -159,13 +160,13 @@ class Drive:
     def on_nodes(self, rig: Rig, samples: Floats, otherwise: bool = False) -> Floats:
         """Return this signal, or one with other errors, on the loader's nodes.
 
-        A spline rings beside corners; they are joined by straight lines. `otherwise`: a signal that
-        jumps is interpolated more coarsely, for the error of the interpolation.
+        Corners are joined by straight lines, beside which a spline would ring. `otherwise`: what
+        jumps beside them is interpolated more coarsely, for the error of the interpolation.
         """
+        rest = samples - self.corners.over(np.arange(len(samples), dtype=np.float64))
         at = np.arange((len(samples) - 1) * rig.substeps + 1) / rig.substeps
-        corners = np.interp(at, np.arange(len(samples)), self.corners)
-        rest = samples - self.corners
-        return (coarsely if otherwise and jumps(rest) else on_nodes)(rig, rest) + corners
+        between = coarsely if otherwise and jumps(rest) else on_nodes
+        return between(rig, rest) + self.corners.over(at)
 
     def unsmoothed(self, noise: Noise) -> Drive:
         """Return the signal as recorded, without smoothing."""
@@ -176,10 +177,11 @@ class Drive:
         """Return the signal with a sample of its error, number k; shape (frames,)."""
         if self.smooth is self.recorded:
             return unsmoothed(self.smooth, k, self.noise)
-        error = with_error(self.smooth, k, self.noise) - self.smooth
+        error = with_error(self.smooth, k, self.noise, bool(self.corners.each)) - self.smooth
         return self.smooth + self.rest.with_error(error, np.random.default_rng([43, k]))
 
     def passed(self, rng: np.random.Generator) -> Floats:
         """Return a sample of the noise that passes the smoother, shape (frames,)."""
         sample = self.noise.sample(len(self.recorded), rng)
-        return self.rest.beside(Smoother.of(self.recorded, noise=self.noise).passed(sample))
+        known = Smoother.of(self.recorded, noise=self.noise, with_corners=bool(self.corners.each))
+        return self.rest.beside(known.passed(sample))

@@ -326,7 +326,7 @@ class Reading:
         """Return F as the input of loader and linkage; zero if not recorded."""
         if self.name_of("force") not in self.record:
             return Drive.of(np.zeros(len(self.record)), Noise(0.0))
-        return Drive.of(self.signal("force"), self.driving("force"))
+        return Drive.of(self.signal("force"), self.driving("force"), with_corners=True)
 
     def name_of(self, quantity: str) -> str:
         """Return the name of a quantity's channel."""
