@@ -20,7 +20,6 @@ from scipy.ndimage import maximum_filter1d
 from coupled.gap.noise.noise import Floats
 from coupled.gap.thresholds import (
     CORNER_FRAMES,
-    DOUBLED,
     FAR_SIGMAS,
     PARTLY,
     ROUNDING_SPAN,
@@ -46,7 +45,7 @@ def corners_in(signal: Floats) -> Corners:
     """Return the corners of a signal, in their order.
 
     Those that a few frames show are taken out first, since others may lie beside them. At the end
-    each is fitted again, up to the next corner.
+    each is fitted again, up to the next corner: over more frames a bend is none.
     """
     frames, corners = np.arange(len(signal), dtype=np.float64), dict[int, tuple[float, float]]()
     noise = float(np.median(np.abs(np.diff(signal, 2)))) / 0.6745 / math.sqrt(6.0)
@@ -65,16 +64,17 @@ def corners_in(signal: Floats) -> Corners:
             least = (1.0 - PARTLY) * size - doubt
             sharp &= turns[reach] * np.sign(turns[most]) >= least
         for at in (np.flatnonzero(sharp[most:-most]) + most).tolist():
-            apart = all(abs(at - other) >= CORNER_FRAMES[1] for other in corners)
+            apart = all(abs(at - other) >= most for other in corners)
             found = _corner(rest, at, most, noise) if apart else None
             if found is not None:
                 corners[at] = found
     rest, kept = signal - Corners(tuple(corners.values())).over(frames), list[tuple[float, float]]()
     ends = [0, *sorted(corners), len(signal) - 1]
     for before, at, after in zip(ends, ends[1:], ends[2:], strict=False):
+        reach = min(at - before, after - at, CORNER_FRAMES[-1])
         own = rest + Corners((corners[at],)).over(frames)
-        found = _corner(own, at, min(at - before, after - at, CORNER_FRAMES[-1]), noise)
-        kept += [corners[at] if found is None else found]
+        found = _corner(own, at, reach, noise) if reach >= CORNER_FRAMES[2] else None
+        kept += [] if found is None else [found]
     return Corners(tuple(kept))
 
 
@@ -102,4 +102,6 @@ def _corner(signal: Floats, at: int, reach: int, noise: float) -> tuple[float, f
         if sizes[0] * sizes[-1] > 0.0 and left < best[0]:
             size = float(np.sum(sizes))
             best = left, (at + float(np.dot(places, sizes)) / size, size)
-    return best[1] if best[0] <= (DOUBLED * noise) ** 2 * len(near) else None
+    freedom = len(near) - 4
+    most = noise**2 * (freedom + FAR_SIGMAS * math.sqrt(2.0 * freedom))  # of χ²
+    return best[1] if best[0] <= most else None

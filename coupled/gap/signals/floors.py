@@ -82,6 +82,8 @@ def with_error(signal: Floats, k: int, level: Noise, with_corners: bool = False)
     rng = np.random.default_rng([41, k])
     raw = signal + level.sample(len(signal), rng)
     smoother = Smoother.of(raw, noise=level, with_corners=with_corners)
+    if not smoother.corners.each:
+        return signal + smoother.wiener_error(level, len(signal), rng)
     return smoother.smooth(raw) + smoother.lost(level, len(signal), rng)
 
 
