@@ -75,7 +75,8 @@ def threads(count: int) -> Iterator[None]:
     """
     limits = importlib.import_module("threadpoolctl").threadpool_limits  # takes 20 ms to load
     most = cores(count)
-    beside = min(most - 1, _MOST_BESIDE) if guarded() else 0
+    may = guarded() and not multiprocessing.current_process().daemon
+    beside = min(most - 1, _MOST_BESIDE) if may else 0
     with limits(1, "blas"), turns(beside) as places:
         before = _team.set(_Team(most, threading.Semaphore(most - 1), turns=places))
         try:
@@ -147,7 +148,7 @@ def _wait_for_all(helpers: Sequence[threading.Thread], places: threading.Semapho
 
 
 def in_turn(work: partial[T]) -> T:
-    """Return what `work` gives, which holds the interpreter and can be pickled (`Turns`)."""
+    """Return what `work` gives, which holds the interpreter (`Turns`)."""
     return _team.get().turns.call(work)
 
 

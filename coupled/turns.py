@@ -2,8 +2,8 @@
 
 A flight of JSBSim lets no other thread of its process run. Of the calls that come while one is at
 work, others are therefore done in processes beside this one. They are started by the first call
-that would have to wait, and used as soon as they have loaded; until then, and wherever a process
-cannot be started, calls wait for each other. What a call returns does not depend on where it is
+that would have to wait, and used as soon as they have loaded. Until then, and in a process that may
+not have children, calls wait for each other. What a call returns does not depend on where it is
 done.
 """
 
@@ -47,7 +47,7 @@ class Turns:
         self._lock = Lock()
 
     def call(self, work: partial[T]) -> T:
-        """Return what `work` gives, and raise what it raises; it can be pickled."""
+        """Return what `work` gives, and raise what it raises; here, if it cannot be pickled."""
         try:
             place = self._idle.get_nowait()
         except Empty:
@@ -89,7 +89,7 @@ class Turns:
                 try:
                     ours.send(work)
                     found, fault = ours.recv()
-                except _GONE:
+                except Exception:  # the process is gone, or cannot be given the work
                     raise _LostError from None
                 except BaseException:  # interrupted: the next answer would be this call's
                     ours.close()

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import io
+import multiprocessing
 import os
 import signal
 import time
 from collections.abc import Callable
+from contextlib import redirect_stderr
 from functools import partial
 
 import pytest
@@ -79,9 +82,30 @@ def test_a_fault_is_raised_where_the_call_was_made() -> None:
         assert len(places(where)) == 2  # and what comes next has its own answer
 
 
-@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="not on this system")
 def test_the_call_of_a_process_that_falls_is_done_here() -> None:
     with threads(2):
         until_beside()
         assert places(fallen, os.getpid()) == {os.getpid()}
         assert places(where) == {os.getpid()}
+
+
+def test_work_that_cannot_be_pickled_is_done_here() -> None:
+    with threads(2):
+        until_beside()
+        here = in_threads(lambda _: in_turn(partial(lambda: where(1))), range(8))
+        assert set(here) == {os.getpid()}
+
+
+def test_a_process_that_may_have_no_children_works_alone() -> None:
+    """A worker of a user's own pool: the start of another process was an error in a thread."""
+    with multiprocessing.get_context("spawn").Pool(1) as pool:
+        inner, said = pool.apply(within_a_pool)
+    assert inner == 1
+    assert said == ""
+
+
+def within_a_pool() -> tuple[int, str]:
+    """Return how many processes worked, and what threads printed."""
+    said = io.StringIO()
+    with redirect_stderr(said), threads(2):
+        return len(places(where) | places(where)), said.getvalue()
