@@ -44,8 +44,8 @@ class Corners:
 def corners_in(signal: Floats) -> Corners:
     """Return the corners of a signal, in their order.
 
-    Those that a few frames show are taken out first, since others may lie beside them. At the end
-    each is fitted again, up to the next corner: over more frames a bend is none.
+    Corners that a few frames show are taken out first, since others may lie beside them. At the end
+    each is fitted again over more frames, up to the next corner, which excludes bends.
     """
     frames, corners = np.arange(len(signal), dtype=np.float64), dict[int, tuple[float, float]]()
     noise = float(np.median(np.abs(np.diff(signal, 2)))) / 0.6745 / math.sqrt(6.0)
