@@ -22,13 +22,14 @@ from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from functools import partial
+from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import Any, TypeVar
 
 from coupled.errors import InputError, say_warning
-from coupled.turns import Turns, block_interruptions, turns
+from coupled.turns import Turns, turns
 
 MOST_WORKERS = 512  # processes: more than any machine has cores for
 _MOST_BESIDE = 3  # processes beside the threads of one piece of work, of 150 MB each
@@ -75,8 +76,8 @@ def threads(count: int) -> Iterator[None]:
     """
     limits = importlib.import_module("threadpoolctl").threadpool_limits  # takes 20 ms to load
     most = cores(count)
-    may = guarded() and not multiprocessing.current_process().daemon
-    beside = min(most - 1, _MOST_BESIDE) if may else 0
+    alone = multiprocessing.parent_process() is not None  # a worker beside others
+    beside = 0 if alone else min(most - 1, _MOST_BESIDE)
     with limits(1, "blas"), turns(beside) as places:
         before = _team.set(_Team(most, threading.Semaphore(most - 1), turns=places))
         try:
@@ -229,6 +230,13 @@ def _hand_over(
         future.add_done_callback(done.put)
 
 
+def block_interruptions() -> None:
+    """Keep interruptions from this thread, and from the processes that it starts as they load."""
+    if hasattr(signal, "pthread_sigmask"):
+        resource_tracker.ensure_running()  # it would unblock them when it starts
+        signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+
+
 def limit_memory() -> None:
     """Let this process ask for half of the machine's memory: a small file can declare any size."""
     with suppress(ImportError, ValueError, OSError):
@@ -267,8 +275,8 @@ def guarded() -> bool:
         frame = frame.f_back
     try:
         tree = ast.parse(Path(file).read_bytes()) if line else None
-    except (OSError, ValueError, SyntaxError):  # no script that could be loaded anew
-        return True
+    except (OSError, ValueError, SyntaxError):  # from standard input; or of an archive, a module
+        return getattr(main, "__spec__", None) is not None
     if tree is None:
         return True
     return any(

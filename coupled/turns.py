@@ -2,28 +2,30 @@
 
 A flight of JSBSim lets no other thread of its process run. Of the calls that come while one is at
 work, others are therefore done in processes beside this one. They are started by the first call
-that would have to wait, and used as soon as they have loaded. Until then, and in a process that may
-not have children, calls wait for each other. What a call returns does not depend on where it is
-done.
+that would have to wait, and used as soon as they have loaded. Until then calls wait for each other.
+What a call returns does not depend on where it is done.
+
+Those processes load the module of the first call only. Those of `multiprocessing` load the main
+module too, which would run the outermost lines of a user's script again.
 """
 
 from __future__ import annotations
 
 import importlib
-import multiprocessing
-import signal
+import os
+import pickle
+import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import partial
-from multiprocessing import resource_tracker
-from multiprocessing.connection import Connection
 from queue import Empty, SimpleQueue
 from threading import Lock, Thread
 from typing import Any, TypeVar
 
 T = TypeVar("T")
 Place = Callable[[partial[Any]], Any]
-_GONE = (EOFError, OSError)  # what a pipe raises whose other end is closed
+_BEGIN = "import sys; sys.path[:] = {path}; from coupled.turns import serve; serve({module!r})"
 _here = Lock()
 
 
@@ -43,7 +45,7 @@ class Turns:
         self._idle: SimpleQueue[Place] = SimpleQueue()
         self._idle.put(_work_here)
         self._beside = beside  # processes that may still be started
-        self._started: list[tuple[Any, Connection]] = []
+        self._started: list[subprocess.Popen[bytes]] = []
         self._lock = Lock()
 
     def call(self, work: partial[T]) -> T:
@@ -72,27 +74,31 @@ class Turns:
 
     def _start_one(self, module: str) -> None:
         """Start a process, in a thread of its own, and offer it as a place when it has loaded."""
-        block_interruptions()
-        spawn = multiprocessing.get_context("spawn")
-        ours, theirs = spawn.Pipe()
-        process = spawn.Process(target=_serve, args=(theirs, module), daemon=True)
-        with suppress(*_GONE):
+        path = [str(one) for one in sys.path]
+        command = [sys.executable, "-c", _BEGIN.format(path=path, module=module)]
+        apart: dict[str, Any] = {"start_new_session": True}  # the terminal interrupts this one only
+        if sys.platform == "win32":
+            apart = {"creationflags": subprocess.CREATE_NO_WINDOW}
+        pipe = subprocess.PIPE
+        with suppress(OSError, EOFError):  # it cannot be started, or ends as it loads
             with self._lock:
                 if self._beside < 0:  # closed meanwhile
                     return
-                process.start()
-                self._started.append((process, ours))
-            theirs.close()
-            ours.recv()
+                process = subprocess.Popen(command, stdin=pipe, stdout=pipe, **apart)
+                self._started.append(process)
+            asked, answered = process.stdin, process.stdout
+            assert asked is not None and answered is not None
+            pickle.load(answered)
 
             def work_beside(work: partial[T]) -> T:
                 try:
-                    ours.send(work)
-                    found, fault = ours.recv()
+                    asked.write(pickle.dumps(work))
+                    asked.flush()
+                    found, fault = pickle.load(answered)
                 except Exception:  # the process is gone, or cannot be given the work
                     raise _LostError from None
                 except BaseException:  # interrupted: the next answer would be this call's
-                    ours.close()
+                    process.kill()
                     raise
                 if fault is not None:
                     raise fault
@@ -105,33 +111,30 @@ class Turns:
         """End the processes."""
         with self._lock:
             self._beside = -1
-            for process, ours in self._started:
-                process.kill()
-                process.join()
-                ours.close()
+            for process in self._started:
+                with suppress(OSError), process:  # closes its pipes and waits for it
+                    process.kill()
 
 
-def _serve(pipe: Connection, module: str) -> None:
+def serve(module: str) -> None:
     """Do one call after another, until the other end of the pipe is closed."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    asked, answered = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # what a library prints is no answer
     importlib.import_module(module)
-    with suppress(*_GONE):
-        pipe.send(None)
+
+    def answer(found: Any, fault: Exception | None) -> None:
+        answered.write(pickle.dumps((found, fault)))
+        answered.flush()
+
+    with suppress(EOFError, OSError):
+        answer(None, None)
         while True:
-            work = pipe.recv()
-            answer: tuple[Any, Exception | None]
+            work = pickle.load(asked)
             try:
-                answer = work(), None
+                found, fault = work(), None
             except Exception as error:  # raised where the call was made
-                answer = None, error
-            pipe.send(answer)
-
-
-def block_interruptions() -> None:
-    """Keep interruptions from this thread, and from the processes that it starts as they load."""
-    if hasattr(signal, "pthread_sigmask"):
-        resource_tracker.ensure_running()  # it would unblock them when it starts
-        signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+                found, fault = None, error
+            answer(found, fault)
 
 
 @contextmanager

@@ -6,10 +6,13 @@ import io
 import multiprocessing
 import os
 import signal
+import subprocess
+import sys
 import time
 from collections.abc import Callable
 from contextlib import redirect_stderr
 from functools import partial
+from pathlib import Path
 
 import pytest
 
@@ -94,6 +97,27 @@ def test_work_that_cannot_be_pickled_is_done_here() -> None:
         until_beside()
         here = in_threads(lambda _: in_turn(partial(lambda: where(1))), range(8))
         assert set(here) == {os.getpid()}
+
+
+@pytest.mark.parametrize("by", ["file", "standard input"])
+def test_a_script_is_not_run_again_by_the_process_beside_it(by: str, tmp_path: Path) -> None:
+    script = """
+from pathlib import Path
+from coupled.parallel import threads
+from tests.test_turns import until_beside
+with Path("runs").open("a") as runs:
+    runs.write("once ")
+with threads(2):
+    until_beside()
+"""
+    written = tmp_path / "script.py"
+    written.write_text(script if by == "file" else "")
+    command = [sys.executable, str(written) if by == "file" else "-"]
+    path = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])}
+    run = partial(subprocess.run, cwd=tmp_path, env=path, input=script, text=True)
+    done = run(command, stderr=subprocess.PIPE, check=True)
+    assert done.stderr == ""
+    assert (tmp_path / "runs").read_text() == "once "
 
 
 def test_a_process_that_may_have_no_children_works_alone() -> None:
