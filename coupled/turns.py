@@ -46,6 +46,7 @@ class Turns:
         self._idle.put(_work_here)
         self._beside = beside  # processes that may still be started
         self._started: list[subprocess.Popen[bytes]] = []
+        self._starting: list[Thread] = []
         self._lock = Lock()
 
     def call(self, work: partial[T]) -> T:
@@ -69,8 +70,9 @@ class Turns:
         """Start the processes that may still be started, and let them load a module."""
         with self._lock:
             wanted, self._beside = self._beside, 0
-        for _ in range(wanted):
-            Thread(target=self._start_one, args=(module,), daemon=True).start()
+            for _ in range(wanted):
+                self._starting.append(Thread(target=self._start_one, args=(module,), daemon=True))
+                self._starting[-1].start()
 
     def _start_one(self, module: str) -> None:
         """Start a process, in a thread of its own, and offer it as a place when it has loaded."""
@@ -111,9 +113,13 @@ class Turns:
         """End the processes."""
         with self._lock:
             self._beside = -1
-            for process in self._started:
-                with suppress(OSError), process:  # closes its pipes and waits for it
-                    process.kill()
+        for process in self._started:
+            process.kill()
+        for thread in self._starting:
+            thread.join()
+        for process in self._started:
+            with suppress(OSError), process:  # closes its pipes and waits for it
+                pass
 
 
 def serve(module: str) -> None:
