@@ -350,20 +350,16 @@ def _fit_with_simpler_law(beam: Beam, law: Effect) -> Fit | None:
 def _fit_neighbours(beam: Beam, fitted: Fit, library: Sequence[Effect], wanted: set[str]) -> None:
     """Fit the neighbours of a fitted set, with effects that show in the `wanted` outputs.
 
-    The candidate of the largest predicted gain is fitted first, and the others only if they may do
-    better. If none is worth a fit beside the best set, a few are fitted all the same: the gain of a
-    law whose shape is far from that of its start cannot be predicted. A law that contains another
-    law is fitted after it, from its optimum, if the best set leaves an output unexplained. Laws of
-    dry friction start from presliding parameters that were fitted before. Effects are screened with
-    the nuisance parameters within their tolerance: beyond it they may have absorbed an effect.
+    The candidate of the largest predicted gain is fitted first. If it explains the outputs, others
+    are fitted only if they may do better; otherwise all are, since a prediction may show a small
+    part of a large gain. If none is worth a fit beside the best set, a few are fitted all the same:
+    the gain of a law whose shape is far from that of its start cannot be predicted. A law that
+    contains another law is fitted after it, from its optimum, if the best set leaves an output
+    unexplained. Laws of dry friction start from presliding parameters that were fitted before.
     """
-    is_best, found, worth = names_of(fitted.effects) == beam.best, fitted, beam.worth(fitted)
-    fitted, beside = (
-        beam.problem.within_tolerance(found),
-        _candidates(found.effects, library, wanted),
-    )
-    many = BEAM_CANDIDATES if is_best else TRIES
-    screened = beam.screen.best(fitted, beside, worth, many, anew=is_best)
+    found, is_best = fitted, names_of(fitted.effects) == beam.best
+    beside = _candidates(found.effects, library, wanted)
+    fitted, screened = _screened(beam, found, beside)
     doubtful = is_best and not screened
     if doubtful:
         screened = beam.screen.best(fitted, beside, Worth(0.0, beam.counts), TRIES)
@@ -371,8 +367,9 @@ def _fit_neighbours(beam: Beam, fitted: Fit, library: Sequence[Effect], wanted: 
     plain = [one for one in screened if not any(contains(one.effect, e) for e in effects)]
     ends = list[Fit]()
     for some in (plain[:1], plain[1:]):
-        worth = beam.worth(found, MOST)
-        still = some if doubtful else beam.screen.still_worth(fitted, some, worth)
+        still = some
+        if not (doubtful or (beam.best and beam.open_outputs(beam.best) & wanted)):
+            still = beam.screen.still_worth(fitted, some, beam.worth(found, MOST))
         dry = next((one for one in still if one.effect.dry), None)
         if dry is not None and not beam.contact:
             first = _fit_sets(beam, _starts_with_one_more(beam, fitted, dry))
@@ -393,6 +390,29 @@ def _fit_neighbours(beam: Beam, fitted: Fit, library: Sequence[Effect], wanted: 
     if len(fitted.effects) > 1:
         others += [*_sets_with_swap(beam, fitted, library), *_sets_without_one(fitted)]
     _fit_sets(beam, others)
+
+
+def _screened(beam: Beam, found: Fit, candidates: Sequence[Effect]) -> tuple[Fit, list[Screened]]:
+    """Return the candidates worth a fit beside a set, and the set as it is beside them.
+
+    Its nuisance parameters are within their tolerance: beyond it they may have absorbed an effect.
+    The presliding parameters of a filed friction have no tolerance. Without effects the candidates
+    are also screened with their initial values, and the screen that predicts more is used.
+    """
+    problem, is_best = beam.problem, names_of(found.effects) == beam.best
+    many = BEAM_CANDIDATES if is_best else TRIES
+    fitted = problem.within_tolerance(found)
+    screened = beam.screen.best(fitted, candidates, beam.worth(found), many, anew=is_best)
+    initial = None if found.effects else problem.with_initial_contact(fitted)
+    if initial is None:
+        return fitted, screened
+    screen = Screen(problem, beam.error)
+    others = screen.best(initial, candidates, beam.worth(initial), many)
+    most, more = (max((one.gain for one in some), default=0.0) for some in (screened, others))
+    if more - beam.behind(initial) <= most:
+        return fitted, screened
+    beam.screen = screen
+    return initial, others
 
 
 def _fit_by_multiple_shooting(beam: Beam) -> None:

@@ -81,6 +81,10 @@ class _Signature(NamedTuple):
     shape: int
     change: Floats
 
+    @property
+    def power(self) -> float:
+        return float(self.change @ self.change)
+
 
 @dataclass
 class Screen:
@@ -108,6 +112,7 @@ class Screen:
             wanted, in_threads(lambda e: self._signatures(current, e), wanted), strict=True
         ):
             self.known[effect.name] = made
+        self._refine(current, wanted)
         found = self._worth_a_fit(current, candidates, worth, most)
         if current.effects and (anew or not found):
             others = [e for e in candidates if all(one.effect is not e for one in found)]
@@ -219,8 +224,11 @@ class Screen:
                 taken, direction = share**2 * size, change / math.sqrt(size)
             gain = max(gain, gain_to(now - share * change))
             left = float((now + change) @ (now + change))
+            # A slope's start has a usual size; the projection gives its sign, or a smaller size.
+            by_slope = STAGE_OF[effect.stage].flown and effect.seen is None
+            times = min(max(-share, -1.0), 1.0) if by_slope else 1.0
             if shape not in starts or left < starts[shape][0]:
-                starts[shape] = left, values
+                starts[shape] = left, _times(self.problem, effect, values, times)
         found = [values for _, values in starts.values()]
         return Screened(effect, found, taken, gain, direction, refitted)
 
@@ -228,37 +236,79 @@ class Screen:
         """Return an effect's signatures with the current effects.
 
         That of an effect of the airframe is its slope, from a small step: between trims further
-        apart, what the trim has left of the accelerations jumps. For other effects, sizes beyond
-        the usual ones are tried while a larger size leaves a smaller residual. The best of them is
-        an additional start, with shape `~shape`: in the residual of several effects the size among
-        the usual ones may be right.
+        apart, what the trim has left of the accelerations jumps.
         """
-        now = _residual(self.problem, effect, current.rig)
         flown = STAGE_OF[effect.stage].flown
         part = SMALL if flown and effect.seen is None else 1.0
+        return [
+            one
+            for shape, tries in enumerate(_tries(self.problem, current, effect))
+            for values in tries
+            for one in self._signature(current, effect, values, shape, part)
+        ]
 
-        def made(values: Values, shape: int) -> list[_Signature]:
-            go_on()
-            rig = _with(self.problem, current, effect, _step(self.problem, effect, values, part))
-            if rig is None:
-                return []
-            return [_Signature(values, shape, (_residual(self.problem, effect, rig) - now) / part)]
+    def _signature(
+        self, current: Fit, effect: Effect, values: Values, shape: int, part: float = 1.0
+    ) -> list[_Signature]:
+        """Return an effect's signature, from a part of the sizes; none if it is no valid rig."""
+        go_on()
+        rig = _with(self.problem, current, effect, _times(self.problem, effect, values, part))
+        if rig is None:
+            return []
+        now = _residual(self.problem, effect, current.rig)
+        return [_Signature(values, shape, (_residual(self.problem, effect, rig) - now) / part)]
+
+    def _refine(self, current: Fit, effects: Sequence[Effect]) -> None:
+        """Add signatures of other sizes than the usual ones, of effects that need no flight.
+
+        Sizes beyond them are tried of all effects. Of those whose projections are then near the
+        largest, so are the sizes that the projections predict: a residual that is not linear in a
+        size is predicted at that of least residual. Single limits have sizes of their own.
+        """
+        some = [e for e in effects if not (STAGE_OF[e.stage].flown or e.seen or is_limit(e))]
+        in_threads(lambda effect: self._refine_one(current, effect, False), some)
+        each = [(self._taken(current, effect), effect) for effect in effects]
+        least = SCREEN_NEAR * max((taken for taken, _ in each), default=0.0)
+        near = [effect for taken, effect in each if taken >= least and effect in some]
+        in_threads(lambda effect: self._refine_one(current, effect, True), near)
+
+    def _taken(self, current: Fit, effect: Effect) -> float:
+        """Return the power of the residual's largest projection on the effect's signatures."""
+        now = _residual(self.problem, effect, current.rig)
+        each = ((one.change, float(one.change @ one.change)) for one in self.known[effect.name])
+        enough = NEGLIGIBLE**2 * len(now)
+        return max((float(now @ a) ** 2 / size for a, size in each if size > enough), default=0.0)
+
+    def _refine_one(self, current: Fit, effect: Effect, by_projection: bool) -> None:
+        """Add signatures of larger sizes, or of projected ones, while these leave less.
+
+        They are a start of their own, of shape `~shape`: beside other effects the size among the
+        usual ones may be right.
+        """
+        now, found = _residual(self.problem, effect, current.rig), list[_Signature]()
+        known = self.known[effect.name]
 
         def left(one: _Signature) -> float:
             return float((now + one.change) @ (now + one.change))
 
-        found = list[_Signature]()
-        for shape, tries in enumerate(_tries(self.problem, current, effect)):
-            ours = [one for values in tries for one in made(values, shape)]
-            while ours and not flown and effect.seen is None:
-                best = min(ours, key=left)
-                further = _further(self.problem, effect, best.values, [one.values for one in ours])
-                more = made(further, ~shape) if further is not None else []
-                if not more or left(more[0]) >= left(best):
+        for shape in sorted({one.shape for one in known if one.shape >= 0}):
+            ours = [one for one in known if one.shape in (shape, ~shape)]
+            while (best := min(ours, key=left)).power > NEGLIGIBLE**2 * len(now):
+                times = -float(now @ best.change) / best.power
+                if not by_projection:
+                    larger = [one for one in ours if one.power > best.power]
+                    times = 0.0 if any(now @ one.change < 0.0 for one in larger) else FURTHER
+                if times <= 0.0:
                     break
-                ours += more
+                values = _times(self.problem, effect, best.values, times)
+                more = self._signature(current, effect, values, ~shape)
+                if values == best.values or not more:
+                    break
+                if left(best) - left(more[0]) < SMALL * float(now @ now):
+                    break
+                ours.append(more[0])
             found += ours
-        return found
+        self.known[effect.name] = found
 
 
 def _residual(problem: Problem, effect: Effect, rig: Rig) -> Floats:
@@ -271,13 +321,14 @@ def _with(problem: Problem, current: Fit, effect: Effect, values: Values) -> Rig
     return problem.rig_of((*current.effects, effect), {**current.values, **values})
 
 
-def _step(problem: Problem, effect: Effect, values: Values, part: float) -> Values:
-    """Return values whose sizes are a part of the given ones."""
+def _times(problem: Problem, effect: Effect, values: Values, times: float) -> Values:
+    """Return values whose sizes are so many times as far from their neutral ones, in bounds."""
     case, found = problem.case, dict(values)
-    for p in effect.free if part != 1.0 else ():
+    for p in effect.free if times != 1.0 else ():
         if p.is_size:
             key, none = effect.value_key(p), p.neutral(case.nominal, case.control)
-            found[key] = none + part * (values[key] - none)
+            far = values[key] / times if p.is_limit else none + times * (values[key] - none)
+            found[key] = float(np.clip(far, *p.bounds(case.nominal, case.control)))
     return found
 
 
@@ -311,15 +362,18 @@ def _tries(problem: Problem, current: Fit, effect: Effect) -> list[list[Values]]
 def _sizes(problem: Problem, current: Fit, effect: Effect, shape: int) -> list[Values]:
     """Return values of an effect's parameters to try; a single one if each needs a flight."""
     flown = STAGE_OF[effect.stage].flown
+    sizes = [(size, factor) for size, factor in zip(BEAM_SIZES, BEAM_FACTORS, strict=True)]
+    if any(p.mode == "added" and p.is_size and p.low < 0.0 for p in effect.free):
+        sizes += [(-size, factor) for size, factor in sizes]
     found = []
-    for k in range(1 if flown or not effect.free else len(BEAM_SIZES)):
+    for size, away in sizes[: 1 if flown or not effect.free else None]:
         values = {}
         for p in effect.free:
             start = value = p.starts[min(shape, len(p.starts) - 1)]
             if not flown and p.mode == "factor":
-                value = 1.0 + BEAM_FACTORS[k] * (start - 1.0)
+                value = 1.0 + away * (start - 1.0)
             elif not flown and p.is_size:
-                value = BEAM_SIZES[k] * start
+                value = size * start
             value += p.base(current.rig, problem.case.control)
             values[effect.value_key(p)] = float(np.clip(value, p.low, p.high))
         found.append(values)
@@ -337,27 +391,6 @@ def _less(problem: Problem, effect: Effect, first: Values) -> list[Values]:
                 values[effect.value_key(p)] = share * least
         found += [values] if values != first else []
     return found
-
-
-def _further(
-    problem: Problem, effect: Effect, values: Values, tried: Sequence[Values]
-) -> Values | None:
-    """Return values of a larger effect in the same direction; None if such values were tried.
-
-    The sizes are `FURTHER` times as far from their neutral values, within their bounds.
-    """
-    case, found, reached = problem.case, dict(values), [0.0]
-    for p in effect.free:
-        key, none = effect.value_key(p), p.neutral(case.nominal, case.control)
-        if not p.is_size or values[key] in (none, 0.0):
-            continue
-        far = values[key] / FURTHER if p.is_limit else none + FURTHER * (values[key] - none)
-        found[key] = float(np.clip(far, *p.bounds(case.nominal, case.control)))
-        for one in tried:
-            reached.append(
-                values[key] / one[key] if p.is_limit else (one[key] - none) / (values[key] - none)
-            )
-    return None if found == values or max(reached) > 1.0 else found
 
 
 def is_limit(effect: Effect) -> bool:

@@ -21,7 +21,7 @@ from coupled.gap.signals.floors import Drive, floor_from, input_noise, noise_in
 from coupled.gap.signals.live import Assumed, Live, Mask, live_of
 from coupled.gap.signals.missed import Missed, missed_in
 from coupled.gap.signals.output import Floats
-from coupled.gap.thresholds import MINOR, PARTLY, SETTLE_s, SHORTEST_RECORD_s
+from coupled.gap.thresholds import MINOR, NEGLIGIBLE, PARTLY, SETTLE_s, SHORTEST_RECORD_s
 from coupled.record.channels import SURFACES, ControlName, channel
 from coupled.record.record import Record
 from coupled.rig.crossing import leaking
@@ -90,7 +90,8 @@ class Sensed:
         if of.scale_drift == 0.0:
             return of.read_scale
         times_s = np.arange(samples, dtype=np.float64) / rate_Hz
-        return np.asarray(of.read_scale * (1.0 + of.scale_drift * times_s))
+        # A search may try a drift that leaves nothing of the reading: it is not divided by 0.
+        return np.asarray(of.read_scale * np.maximum(1.0 + of.scale_drift * times_s, NEGLIGIBLE))
 
     def force(self, recorded: Floats) -> Floats:
         """Return F in N at each frame from the recorded F."""
