@@ -38,6 +38,13 @@ _HOST = re.sub(r"[^A-Za-z0-9]", "_", platform.node())[:40]
 _UNFINISHED = re.compile(r"\.coupled-([A-Za-z0-9_]*)-(\d{1,9})-[0-9a-f]{12}(\.[^/]*)?", re.DOTALL)
 
 
+def named(path: Path) -> Path:
+    """Return a path that has a name to put another one beside. Raises InputError for `.` or `/`."""
+    if not path.name:
+        raise InputError(path, "", "names no file and no new folder; give one by its name")
+    return path
+
+
 def open_file(path: Path, most_bytes: int = MOST_TABLE_bytes) -> BufferedReader:
     """Return an open plain file of at most so many bytes.
 

@@ -100,6 +100,7 @@ def test_a_rig_may_be_an_aircraft_alone(tmp_path: Path) -> None:
         *(("map", "air.toml"), ("stability", "air.toml"), ("document", "air.toml")),
         *(("bench", "--rig", "air.toml"), ("calibrate", "--plan", "--rig", "air.toml")),
         *(("new", "run", "n.toml", "--rig", "air.toml"), ("export", "air.toml", "--jsbsim", "o")),
+        *(("export", "air.toml", "--fmu", "a.fmu"),),
         *(("compare", "./run.toml"), ("fly", "./run.toml"), ("check", "./run.toml")),
         *(("sweep", "sweep.toml"), ("live", "./run.toml")),
     ):

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from math import inf
+from numbers import Real
 from os import PathLike
 from pathlib import Path
 from typing import TypedDict, Unpack
@@ -17,7 +19,7 @@ from coupled.calibration.plan import STRONGEST_N, fewest, stations
 from coupled.calibration.planned import ReadingsPlan, plan_readings
 from coupled.calibration.readings import Readings
 from coupled.calibration.readingsfile import write_readings
-from coupled.errors import InputError, nearest
+from coupled.errors import InputError, nearest, shown_value
 from coupled.files import check_target, write_text
 from coupled.record.channels import ControlName
 from coupled.rig.rig import Rig
@@ -49,12 +51,24 @@ def plan(
     True
     """
     data, tools = _asked(rig, control, instruments)
+    asked = {"precision": precision, "strongest_N": strongest_N, "crossed_N": crossed_N}
+    _check_ranges("coupled.plan", asked)
     target = _csv(file)
     looks = 1 if once else 2
     made = plan_readings(data, control, tools, precision, strongest_N, looks, crossed_N, progress)
     if target is not None:
         write_text(target, made.form())
     return made
+
+
+RANGES = {
+    "precision": (0.001, 1.0),
+    "strongest_N": (1.0, 2000.0),
+    "crossed_N": (0.0, 2000.0),
+    "gradients": (1, 30),
+    "deflections": (1, 60),
+    "nulls": (0, 50),
+}
 
 
 class Taking(TypedDict, total=False):
@@ -96,6 +110,8 @@ def bench(
     """
     known_keys(dict(taking), dict.fromkeys(Taking.__annotations__), "coupled.bench", "")
     data, tools = _asked(rig, control, taking.get("instruments"))
+    asked = {"gradients": gradients, "deflections": deflections, "precision": precision, **taking}
+    _check_ranges("coupled.bench", asked)
     target, once = _csv(file), taking.get("once", False)
     strongest_N = taking.get("strongest_N", STRONGEST_N)
     grid = stations(data, control, gradients, deflections, strongest_N)
@@ -109,6 +125,14 @@ def bench(
     if target is not None:
         write_readings(target, readings, control)
     return readings
+
+
+def _check_ranges(function: str, given: Mapping[str, object]) -> None:
+    """Refuse a number that is outside its range."""
+    for name, value in given.items():
+        low, high = RANGES.get(name, (-inf, inf))
+        if isinstance(value, Real) and not low <= float(value) <= high:
+            raise InputError(function, name, f"is {shown_value(value)}; give {low:g} to {high:g}")
 
 
 def _asked(

@@ -11,7 +11,7 @@ from coupled.errors import InputError
 from coupled.record import record as files
 from coupled.record.importing import convert
 from coupled.record.importing.account import ImportAccount
-from coupled.record.record import DataFrame, Record
+from coupled.record.record import DataFrame, Record, record_of
 from coupled.rig.rig import Rig
 
 Given = Record | DataFrame | str | PathLike[str]
@@ -100,19 +100,19 @@ def named_records(records: Given | Sequence[Given] | Mapping[str, Given]) -> dic
     if not records:
         raise InputError("records", "", "needs at least one")
     if isinstance(records, Mapping):
-        return {name: _record(given) for name, given in records.items()}
+        return {name: _record(given, name) for name, given in records.items()}
     named: dict[str, Record] = {}
     for i, given in enumerate(records, 1):
         numbered = "record" if len(records) == 1 else f"record {i}"
         name = fspath(given) if isinstance(given, (str, PathLike)) else numbered
         if name in named:
             raise InputError(name, "", "is given twice")
-        named[name] = _record(given)
+        named[name] = _record(given, name)
     return named
 
 
-def _record(given: Given) -> Record:
-    """Return a record given as such, as a DataFrame, or as a file."""
+def _record(given: Given, name: str) -> Record:
+    """Return a record given as such, which is checked as a file's is, as a DataFrame, or a file."""
     if isinstance(given, Record):
-        return given
+        return record_of({each: given[each] for each in given.channels}, name, given.manifest)
     return Record.from_frame(given) if isinstance(given, DataFrame) else read_record(given)

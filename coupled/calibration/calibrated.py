@@ -26,7 +26,7 @@ from coupled.calibration.accuracy import (
 from coupled.calibration.assumed import GAINS, assumed_scales, real_scales
 from coupled.calibration.estimate import Estimate
 from coupled.calibration.result import CalibrationResult
-from coupled.errors import InputError
+from coupled.errors import InputError, nearest
 from coupled.record.channels import ControlName, unit_of
 from coupled.rig.guesses import without_guesses
 from coupled.rig.parameters import Control
@@ -48,8 +48,8 @@ def with_calibration(
 
     `date` is stored as given. With `hardware` the rig's own structure and scales become those
     found, too: for readings of a real loader, whose rig file is a model. A scale that the file does
-    not state becomes that found in any case. Raises InputError if the values give an impossible
-    rig.
+    not state becomes that found in any case. Raises InputError if the rig lacks the control, the
+    calibration is of another one, or the values give an impossible rig.
 
     >>> import coupled
     >>> rig = coupled.load_rig("report-column")
@@ -58,6 +58,12 @@ def with_calibration(
     >>> calibrated["controls.column.compensation.bend_m_per_N"] == found.line.bend.value
     True
     """
+    if control not in rig.controls:
+        problem = f"the rig has no {control}; {nearest(control, rig.controls)}"
+        raise InputError(rig.file or rig.name, "controls", problem)
+    if found.control != control:
+        problem = f"the calibration is of the {found.control}, not of the {control}"
+        raise InputError(rig.file or rig.name, control, problem)
     data, d = rig.controls[control], unit_of(control)
     place, sensing = f"controls.{control}", data.sensing
     bend = found.line.bend

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
+from coupled.errors import InputError
 from coupled.units import DEGREE_rad
 
 Floats = NDArray[np.float64]
@@ -93,6 +94,12 @@ class Instruments:
     ruler_step: float
     scale_step: float
     meter_step: float
+
+    def __post_init__(self) -> None:
+        """Refuse errors below 0, and those of no instrument. Raises InputError."""
+        for name, error in vars(self).items():
+            if not 0.0 <= error <= 10.0:
+                raise InputError("instruments", name, f"is {error:g}; give 0 to 10")
 
     def deflection_variance(self, deflection: Floats, looks: Floats | float = 1.0) -> Floats:
         """Return the variance of the mean of `looks` readings of the ruler, d².

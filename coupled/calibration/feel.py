@@ -48,6 +48,12 @@ class Sweep:
     pressure: Floats
     motion: Floats
 
+    @property
+    def far(self) -> NDArray[np.bool_]:
+        """The readings that are not near neutral."""
+        size = np.abs(self.deflection)
+        return np.asarray(size > NEUTRAL * np.max(size))
+
 
 @dataclass(frozen=True)
 class Feel:
@@ -153,12 +159,18 @@ def sweep_of_record(record: Record, control: ControlName, file: Path) -> Sweep:
 def _check(path: Path, numbers: Sequence[int], sweep: Sweep) -> None:
     """Refuse readings that do not determine friction and curve; `numbers` are their rows."""
     outward = sweep.motion * np.sign(sweep.deflection)
+    furthest = int(np.argmax(np.abs(sweep.deflection)))
+    most = f"{sweep.deflection[furthest]:g}, in row {numbers[furthest]}"
     for q in np.unique(sweep.pressure):
         here = sweep.pressure == q
         where = f" at {q:g} Pa" if np.ptp(sweep.pressure) > 0.0 else ""
         if np.count_nonzero(here) < LEAST_READINGS:
             problem = f"holds {np.count_nonzero(here)} readings{where}; {LEAST_READINGS} are needed"
             raise InputError(path, "", problem)
+        if (count := np.count_nonzero(here & sweep.far)) < LEAST_READINGS:
+            problem = f"has {count} of its readings{where} beyond {NEUTRAL:.0%} of the largest"
+            problem += f" deflection, {most}; {LEAST_READINGS} are needed: is that one in another"
+            raise InputError(path, "", f"{problem} unit?")
         for way, word in ((1.0, "out"), (-1.0, "back")):
             if not np.any(outward[here] == way):
                 problem = f"holds no reading on the way {word}{where}; sweep out and back"
@@ -171,8 +183,7 @@ def _check(path: Path, numbers: Sequence[int], sweep: Sweep) -> None:
 
 def fit_feel(sweep: Sweep) -> Feel:
     """Return breakout, friction and curve of a sweep."""
-    most = float(np.max(np.abs(sweep.deflection)))
-    used = (np.abs(sweep.deflection) > NEUTRAL * most) & (sweep.motion != 0.0)
+    used = sweep.far & (sweep.motion != 0.0)
     both = bool(np.any(sweep.deflection[used] > 0.0) and np.any(sweep.deflection[used] < 0.0))
     found = [_Fit(sweep, used, odd) for odd in ((True, False) if both else (True,))]
     best = min(found, key=lambda fit: fit.criterion)

@@ -150,6 +150,8 @@ def _changed(
     tables = copy.deepcopy(dict(table))
     tables.pop("expect", None)
     listed = tables.get("case", []) or [{"label": str(tables.get("name", "run"))}]
+    if not (isinstance(listed, list) and all(isinstance(case, dict) for case in listed)):
+        return manoeuvres_from_table(tables, file)[0]  # which refuses it
     chosen = [c for c in listed if label in (None, c.get("label"))]
     case = chosen[0] if chosen else listed[0]
     for key, value in changes.items():

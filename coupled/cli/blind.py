@@ -12,7 +12,7 @@ from coupled.cli.app import JsonOption, app, check_cluster
 from coupled.cli.progress import progress
 from coupled.cli.terminal import check_json, keep_json, out, print_json, say
 from coupled.errors import InputError
-from coupled.files import check_target
+from coupled.files import check_target, named
 from coupled.outputs import Outputs
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ def make(
     from coupled.blind.trials.make import make as make_trials
 
     processes, address = check_cluster(workers, cluster)
-    path = key or folder.with_name(folder.name + ".key.json")
+    path = key or named(folder).with_name(folder.name + ".key.json")
     if folder.is_file():
         raise InputError(folder, "", "is a file; give a new folder")
     try:
@@ -96,7 +96,8 @@ def score(
     from coupled.blind.trials.key import SEAL, check_seal, read_key
     from coupled.blind.trials.score import score as score_answers
 
-    sealed = seal or key.with_name(key.name.removesuffix(".json").removesuffix(".key")) / SEAL
+    own = named(key).name.removesuffix(".json").removesuffix(".key")
+    sealed = seal or key.with_name(own) / SEAL
     inputs = [key, sealed, *diagnoses.glob("*.json")]
     if figure is not None:
         from coupled.plots.saving import check_format

@@ -176,6 +176,7 @@ def _bench(
     units: System,
 ) -> None:
     """Write a rig without an aircraft; on a terminal, prompt for numbers not given."""
+    from coupled.gap.checks import check_record, frame_rate_of
     from coupled.rig.rigfile import rig_from_table
     from coupled.schema import loads_toml
     from coupled.surveying.benchrig import answer, bench_rig, questions, split_answers, yes
@@ -189,16 +190,21 @@ def _bench(
     numbers = {
         name: answer(text, asked[name], units) for name, text in answers.items() if name in asked
     }
-    found = None
+    found, record, rate_Hz = None, None, 120.0
     if log is not None:
-        found = numbers_from_log(_logged(log, map_file), control, log)
+        record = _logged(log, map_file)
+        rate_Hz = frame_rate_of(record, log)
+        found = numbers_from_log(record, control, log)
     servo = yes(answers["servo"]) if "servo" in answers else False
     if log is None and sys.stdin is not None and sys.stdin.isatty():
         if "servo" not in answers:
             servo = typer.confirm("a servo or motor moves the control?", default=False)
         numbers = _prompt_for_numbers(control, numbers, servo, units)
-    text = bench_rig(path.stem, control, numbers, servo, found, shown(log.name) if log else "")
-    rig_from_table(loads_toml(text, path), path)  # a rig that cannot be flown is refused
+    source = shown(log.name) if log else ""
+    text = bench_rig(path.stem, control, numbers, servo, found, source, rate_Hz)
+    rig = rig_from_table(loads_toml(text, path), path)  # a rig that cannot be flown is refused
+    if record is not None:
+        check_record(rig, record, control, log)
     write_new(path, text, ".toml", f"coupled new run --rig {path}")
     if found is not None:
         _print_found(found, control, units)

@@ -11,7 +11,7 @@ from coupled.cli.app import JsonOption, UnitsOption, app
 from coupled.cli.progress import progress
 from coupled.cli.rigs import DEFAULT_RIG, say_doubts
 from coupled.cli.terminal import check_json, err, keep_json, out, print_json, say
-from coupled.files import check_target
+from coupled.files import check_target, named
 from coupled.outputs import Outputs
 from coupled.resources import find, shipped_rigs
 
@@ -51,7 +51,7 @@ def stability(
     data = read_rig(file)
     bent = compliant_controls(data, control or None, "--control")
     path = output or Path("out") / f"{data.name}-stability.png"
-    table = path.with_suffix(".csv")
+    table = named(path).with_suffix(".csv")
     check_format(path)
     for target in (path, table):
         check_target(target, [file])

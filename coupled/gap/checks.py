@@ -76,28 +76,52 @@ def check_record(
         if regressor is not None and regressor not in record:
             problem = f"has no channel {regressor}, the regressor of the rig file"
             raise InputError(file, "", f"{problem}; {nearest(regressor, record.channels)}")
-    time = record.time_s
-    steps = np.diff(time)
-    rate = 1.0 / float(np.median(steps))
+    rate = rate_of(record, file)
     if abs(rate / rig.frame_rate - 1.0) > TINY:
         slower = rig.frame_rate / rate
         unit = next((unit for n, unit in FINER.items() if abs(slower / n - 1.0) <= TINY), "")
         asked = f"is it in {unit}?" if unit else "another rig?"
         problem = f"runs at {rate:.4g} Hz, the rig at {rig.frame_rate:g} Hz: {asked}"
         raise InputError(file, "time_s", problem)
-    gap = np.flatnonzero(np.abs(steps * rig.frame_rate - 1.0) > NEGLIGIBLE)
-    if gap.size:
-        raise InputError(file, "time_s", f"has a gap or a jump after {time[gap[0]]:.3f} s")
-    if len(time) < SHORTEST_RECORD_s * rig.frame_rate:
+    check_samples(record, file)
+    if len(record) < SHORTEST_RECORD_s * rig.frame_rate:
         _check_short(record, control, file)
-    for name in record.channels:
-        if not np.all(np.isfinite(record[name])):
-            row = int(np.argmax(~np.isfinite(record[name])))
-            raise InputError(file, name, f"row {row + 2} holds no number")
     if rig.flight is not None:
         _check_angles(record, file)
     if rig.controls and moved:
         _check_channels(rig, record, control, file)
+
+
+def rate_of(record: Record, file: object) -> float:
+    """Return the rows in a second. Raises InputError if there are too few, or time stands still."""
+    steps = np.diff(record.time_s)
+    if not (steps.size and float(np.median(steps)) > 0.0):
+        problem = f"does not rise over {len(record)} rows; a record has one row at each time"
+        raise InputError(file, TIME, problem)
+    return 1.0 / float(np.median(steps))
+
+
+def frame_rate_of(record: Record, file: object) -> float:
+    """Return a record's rate, Hz. Raises InputError if it is no frame rate of a rig."""
+    rate_Hz = rate_of(record, file)
+    if not 1.0 <= rate_Hz <= 1e4:
+        unit = next((unit for n, unit in FINER.items() if 1.0 <= rate_Hz * n <= 1e4), "")
+        asked = f"is it in {unit}?" if unit else "a rig has 1 to 10000 Hz"
+        raise InputError(file, TIME, f"runs at {rate_Hz:.4g} Hz: {asked}")
+    span_s = float(record.time_s[-1] - record.time_s[0])
+    return float(f"{(len(record) - 1) / span_s:.6g}")
+
+
+def check_samples(record: Record, file: object) -> None:
+    """Raise InputError if a record's time has a gap, or one of its cells holds no number."""
+    time = record.time_s
+    gap = np.flatnonzero(np.abs(np.diff(time) * rate_of(record, file) - 1.0) > NEGLIGIBLE)
+    if gap.size:
+        raise InputError(file, TIME, f"has a gap or a jump after {time[gap[0]]:.3f} s")
+    for name in record.channels:
+        if not np.all(np.isfinite(record[name])):
+            row = int(np.argmax(~np.isfinite(record[name])))
+            raise InputError(file, name, f"row {row + 2} holds no number")
 
 
 def _check_angles(record: Record, file: object) -> None:
@@ -424,10 +448,11 @@ def motion_alone(records: Mapping[str, Record]) -> dict[str, Record]:
     return found
 
 
-def at_rate_of(rig: Rig, record: Record) -> Rig:
-    """Return the rig with the frame rate of a record, and steps per frame to match its own."""
+def at_rate_of(rig: Rig, records: Mapping[str, Record]) -> Rig:
+    """Return the rig with the frame rate of the first record, and steps per frame by its own."""
     assert rig.flight is not None
-    rate_Hz = 1.0 / float(np.median(np.diff(record.time_s)))
+    file, record = next(iter(records.items()))
+    rate_Hz = rate_of(record, file)
     if abs(rate_Hz / rig.frame_rate - 1.0) <= TINY:
         return rig
     wanted = rig.frame_rate * rig.flight.steps_per_frame / rate_Hz

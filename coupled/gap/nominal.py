@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from coupled.errors import InputError, nearest
-from coupled.gap.checks import check_record
+from coupled.gap.checks import at_rate_of, check_record, trimmed
 from coupled.gap.effects.effect import (
     BY_REGRESSOR,
     Effect,
@@ -268,6 +268,19 @@ class NominalFit(TableResult):
         }
 
 
+def _flown_as_recorded(rig: Rig, records: Mapping[str, Record], keys: Sequence[str]) -> Rig:
+    """Return the rig with the trim of the records, if keys of its aircraft are fitted.
+
+    An aircraft alone takes their rate too. Raises InputError if it is given no keys.
+    """
+    if rig.controls and not any(key.startswith("flight.") for key in keys):
+        return rig
+    if not keys:
+        problem = 'the rig has an aircraft only: give its keys, as "flight.pitch_damping"'
+        raise InputError(rig.file or rig.name, "--free", problem)
+    return trimmed(rig if rig.controls else at_rate_of(rig, records), records)[0]
+
+
 def fit_nominal(
     rig: Rig,
     records: Mapping[str, Record],
@@ -283,6 +296,7 @@ def fit_nominal(
     Raises InputError if a record is of another rig, or if no record depends on a key.
     """
     rig = as_driven(rig, list(records.values()), control) if control in rig.controls else rig
+    filed, rig = rig, _flown_as_recorded(rig, records, keys)
     for file, record in records.items():
         check_record(rig, record, control, file)
     readers = readers_of(rig, records, control)
@@ -330,7 +344,7 @@ def fit_nominal(
     found = tuple(numbers.values())
     used = [output for output in outputs if output.stage in shown_in]
     files = list(records)
-    known = _with_fitted(rig, control, found)
+    known = _with_fitted(filed, control, found)
     fitted = {one.key for one in found if one.half is not None}
     doubts = _doubts_of_servo(known, control, fitted, held.rig, used)
     return NominalFit(
@@ -426,9 +440,10 @@ def _doubts_of_servo(
     `held` is the rig fitted to the stretches that are not held out. A servo that was not fitted is
     not judged.
     """
+    if not {"loader.servo_frequency_Hz", "loader.servo_damping_ratio"} & fitted:
+        return ()
     loader = found.controls[control].loader
-    keys = {"loader.servo_frequency_Hz", "loader.servo_damping_ratio"}
-    if not keys & fitted or loader.servo_frequency == 0.0:
+    if loader.servo_frequency == 0.0:
         return ()
     reasons = []
     if loader.servo_damping_ratio < LEAST_SERVO_RATIO:
@@ -479,6 +494,8 @@ def _with_fitted(rig: Rig, control: ControlName, numbers: Sequence[Number]) -> R
 
     The values that the host assumes of the loader do not change, since the records contain them.
     """
+    if control not in rig.controls:
+        return rig.changed({one.key: one.found for one in numbers})
     data = rig.controls[control]
     changes: dict[str, Any] = {}
     for one in numbers:

@@ -106,7 +106,7 @@ def prepare(
     records = {file: judged_part(record, file) for file, record in records.items()}
     if not rig.controls:
         records = motion_alone(records)
-        rig = at_rate_of(rig, next(iter(records.values())))
+        rig = at_rate_of(rig, records)
     rig = as_driven(rig, list(records.values()), control) if control in rig.controls else rig
     rig, trim = trimmed(rig, records)
     for file, record in records.items():

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from coupled.arguments import public
 from coupled.errors import InputError, MissingKeyError, nearest, shown, shown_value
-from coupled.files import MOST_TEXT_bytes, check_format, json_text, read_bytes, write_text
+from coupled.files import MOST_TEXT_bytes, check_format, json_text, named, read_bytes, write_text
 from coupled.outputs import Outputs
 from coupled.record.channels import TIME, misnamed
 from coupled.record.csvfile import read_columns, write_table
@@ -131,6 +131,8 @@ class Record(TableResult):
         if rows < 2 or TIME not in self:
             return f"Record({rows} rows; {what})"
         step_s = float(np.median(np.diff(self.time_s)))
+        if not step_s > 0.0:
+            return f"Record({rows} rows, whose time does not rise; {what})"
         return f"Record({rows} rows, {rows * step_s:g} s at {1.0 / step_s:g} Hz; {what})"
 
     @property
@@ -164,16 +166,18 @@ class Record(TableResult):
 
         By default: each control's force and deflection, its surface, and the motion, in usual
         units. A notebook shows the returned figure; `.savefig(path)` writes it. Raises InputError
-        for an unknown channel.
+        for an unknown channel, and without rows.
         """
         from coupled.plots.histories import draw_channels, draw_record
 
+        if not len(self):
+            raise InputError("record", "", "holds no rows to draw")
         return draw_channels(self, channels, title) if channels else draw_record(self, title)
 
 
 def manifest_path(path: Path) -> Path:
     """Return the path of a record's manifest."""
-    return path.with_suffix(".manifest.json")
+    return named(path).with_suffix(".manifest.json")
 
 
 def check_suffix(path: Path) -> None:
@@ -183,10 +187,20 @@ def check_suffix(path: Path) -> None:
 
 
 def write_record(record: Record, path: Path) -> None:
-    """Write a record, and its manifest beside it: both, or neither."""
+    """Write a record, and its manifest beside it: both, or neither.
+
+    Raises InputError for a record that could not be read again, or a manifest that is no JSON.
+    """
     check_suffix(path)
+    record_of({name: record[name] for name in record.channels}, path)
     frame = record.to_polars()
     manifest = {**record.manifest, "format": FORMAT}
+    for key, value in manifest.items():
+        try:
+            json_text(value)
+        except (TypeError, ValueError):
+            problem = f"is {shown_value(value)}; give text, numbers, lists and tables of them"
+            raise InputError(path, f"manifest.{key}", problem) from None
     with Outputs() as outputs:
         write_table(frame, outputs.at(path))
         write_text(outputs.at(manifest_path(path)), json_text(manifest, sort_keys=True))

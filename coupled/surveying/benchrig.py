@@ -94,6 +94,8 @@ def split_answers(words: list[str], control: ControlName) -> dict[str, str]:
         if not sign or name not in known:
             problem = f"{word!r} is no NAME=VALUE of {', '.join(known)}; {nearest(name, known)}"
             raise InputError("new rig", "--set", problem)
+        if name in answers:
+            raise InputError("new rig", "--set", f"gives {name} twice")
         answers[name] = value
     return answers
 
@@ -137,18 +139,20 @@ def bench_rig(
     servo: bool,
     log: LogNumbers | None = None,
     source: str = "",
+    rate_Hz: float = 120.0,
 ) -> str:
     """Return the text of a rig file without an aircraft.
 
     `given` are numbers in SI by name, which its owner knows. Those of a `log` come next, from the
-    file `source`; the others are guesses. The gradient is the same at any q̄: one row of a table.
+    file `source`, whose rows are at `rate_Hz`; the others are guesses. The gradient is the same at
+    any q̄: one row of a table.
     """
     asked = questions(control)
     values, known = guesses(control, servo), set(given)
     measured: dict[str, float] = {}
     if log is not None:
         measured, sure = found_in(log)
-        measured = {key: value for key, value in measured.items() if value > 0.0}
+        measured = {k: value for k, value in measured.items() if value > 0.0 or k in sure}
         known |= sure
     values |= measured | dict(given)
     remarks = {
@@ -180,7 +184,7 @@ def bench_rig(
         *HOW_TO_SETTLE,
         "",
         f'name = "{name}"',
-        "frame_rate_Hz = 120.0",
+        f"frame_rate_Hz = {rate_Hz!r}",
         *control_lines(
             control,
             hardware,

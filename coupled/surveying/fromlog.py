@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 from coupled.errors import InputError
+from coupled.gap.checks import check_samples
 from coupled.record.channels import ControlName, channel
 from coupled.record.record import Record
 
@@ -56,7 +57,7 @@ def numbers_from_log(record: Record, control: ControlName, file: object) -> LogN
     """Return a control's numbers by a record of it that was moved slowly and let go.
 
     The record needs the force, and the deflection or the computed one. Raises InputError, which
-    names `file`, where it has not both, or the control hardly moves.
+    names `file`, where it has not both, a cell is empty, or the control hardly moves.
     """
     force_name, deflections = channel(control, "force"), ("deflection", "computed")
     names = [channel(control, each) for each in deflections]
@@ -65,6 +66,7 @@ def numbers_from_log(record: Record, control: ControlName, file: object) -> LogN
         lacking = force_name if force_name not in record.channels else names[0]
         problem = f"is missing: a first rig needs the force and a deflection of the {control}"
         raise InputError(file, lacking, problem)
+    check_samples(record, file)
     force, x = record[force_name], record[there[0]]
     travel = float(np.max(np.abs(x)))
     if travel <= 0.0 or float(np.ptp(force)) <= 0.0:

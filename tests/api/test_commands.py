@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
+from math import nan
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +12,8 @@ import polars as pl
 import pytest
 
 import coupled
+from coupled.calibration.estimate import usual_instruments
+from coupled.errors import InputError
 from coupled.files import finite
 from coupled.rig.rigfile import read_rig
 from coupled.schema import load_toml
@@ -163,3 +167,28 @@ def test_calibration_goes_into_a_rig(tmp_path: Path) -> None:
     for section in ("sensing", "compensation", "calibration"):
         assert own_rig["controls"]["column"][section] == told_rig["controls"]["column"][section]
     assert coupled.load_rig(tmp_path / "own.toml") == coupled.load_rig(tmp_path / "told.toml")
+
+
+def test_a_calibration_of_another_control_goes_into_no_rig() -> None:
+    found = coupled.calibrate(coupled.bench(gradients=3, deflections=3))
+    with pytest.raises(InputError, match="the calibration is of the column, not of the wheel"):
+        coupled.with_calibration(coupled.load_rig("t37"), "wheel", found)
+    with pytest.raises(InputError, match="the rig has no wheel"):
+        coupled.with_calibration(coupled.load_rig("report-column"), "wheel", found)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("precision", -1.0), ("precision", nan), ("strongest_N", nan), ("crossed_N", -1.0)],
+)
+def test_a_plan_refuses_numbers_out_of_range(name: str, value: float) -> None:
+    with pytest.raises(InputError, match=rf"coupled\.plan: {name}: is .*; give "):
+        coupled.plan("report-column", **{name: value})  # type: ignore[arg-type]
+    with pytest.raises(InputError, match=rf"coupled\.bench: {name}: is .*; give "):
+        coupled.bench("report-column", **{name: value})  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("error", [-1.0, nan, 11.0])
+def test_an_instrument_has_no_error_below_0(error: float) -> None:
+    with pytest.raises(InputError, match=r"instruments: meter: is .*; give 0 to 10"):
+        replace(usual_instruments("column"), meter=error)

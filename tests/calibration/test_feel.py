@@ -132,6 +132,11 @@ def test_a_cyclic_flat_about_the_middle_is_unlike_on_its_two_sides(tmp_path: Pat
             "row 9",
             "has forces against the deflections",
         ),
+        (
+            [f"0,{d / 90},{9 + d}" for d in (*range(1, 9), 3600, *range(8, 0, -1))],
+            "",
+            "has 1 of its readings beyond 1% of the largest deflection, 40, in row 10",
+        ),
     ],
 )
 def test_readings_that_decide_nothing_are_one_line(

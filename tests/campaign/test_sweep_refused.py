@@ -164,3 +164,14 @@ def test_a_cluster_that_does_not_answer_is_one_line(
         ):
             pass
     assert not (folder / "out").exists()
+
+
+@pytest.mark.parametrize("case", ['[case]\nlabel = "a"\n', "case = 1\n", "case = [1]\n"])
+def test_a_runs_case_that_is_no_list_of_tables_is_refused(folder: Path, case: str) -> None:
+    run = (folder / "push.toml").read_text()
+    run = run + case if case.startswith("[") else case + run
+    (folder / "push.toml").write_text(run)
+    done = coupled(folder, "sweep", "s.toml")
+    assert done.returncode == 2
+    assert "push.toml: case" in done.stderr
+    assert done.stderr.count("\n") == 1

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from coupled import diagnose as judge
-from coupled import load_rig
+from coupled import fit, load_rig
 from coupled.errors import InputError
 from coupled.gap.checks import at_rate_of, motion_alone, trimmed
 from coupled.gap.diagnose import diagnose
@@ -118,7 +118,7 @@ def test_a_fault_of_the_forces_is_not_judged_by_an_aircraft_alone(healthy: Recor
 def test_a_rig_takes_the_frame_rate_of_a_log_and_keeps_its_own_steps(healthy: Record) -> None:
     def rate_of(every: int) -> tuple[float, int]:
         slow = Record(healthy.channels, healthy.data[::every])
-        rig = at_rate_of(alone(), slow)
+        rig = at_rate_of(alone(), {"slow": slow})
         return rig.frame_rate, rig["flight.steps_per_frame"]
 
     assert [rate_of(every) for every in (1, 2, 5)] == [(120.0, 1), (60.0, 2), (24.0, 5)]
@@ -155,6 +155,15 @@ def test_what_an_aircraft_alone_cannot_be_asked_is_refused(healthy: Record) -> N
         judge(alone(), {"log": healthy}, healthy={"well": healthy})
 
 
+def test_a_number_of_an_aircraft_alone_is_fitted_at_the_rate_of_the_log(healthy: Record) -> None:
+    slow = Record(healthy.channels, healthy.data[::2])
+    (number,) = fit(alone(), slow, free=["flight.pitch_damping"]).numbers
+    assert number.half is not None
+    assert abs(number.found - 1.0) < number.half < 0.05
+    with pytest.raises(InputError, match=r"--free: the rig has an aircraft only: give its keys"):
+        fit(alone(), slow)
+
+
 def test_terms_without_an_aircraft_are_refused(healthy: Record) -> None:
     with pytest.raises(InputError, match="--terms: the rig has no aircraft"):
         diagnose(bench({}), {"log": healthy}, terms=True)
@@ -166,7 +175,7 @@ def test_a_log_that_was_imported_beside_a_rig_is_trimmed_as_it_begins(tmp_path: 
     record, _ = import_log(log, None, alone())
     manifest = {"rig": json.loads(alone().model_dump_json()), "imported_from": log.name}
     known = Record(record.channels, record.data, manifest)
-    rig, said = trimmed(at_rate_of(alone(), known), {"log": known})
+    rig, said = trimmed(at_rate_of(alone(), {"log": known}), {"log": known})
     assert rig.flight is not None and rig.flight.calibrated_airspeed == pytest.approx(52.0, abs=1.0)
     assert "the first rows of log" in said
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import polars as pl
 import pytest
 
 from coupled.errors import InputError
@@ -155,6 +157,7 @@ def test_an_answer_may_have_its_own_unit(text: str, name: str, value: float) -> 
     [
         (("--bench", "a.toml", "--set", "mass=4lb"), "mass: 'lb' is no unit of it"),
         (("--bench", "a.toml", "--set", "travel=0"), "travel: '0' is no number above 0, in m"),
+        (("--bench", "a.toml", "--set", "mass=4", "--set", "mass=5"), "gives mass twice"),
         (("--bench", "a.toml", "--set", "weight=3"), "--set: 'weight=3' is no NAME=VALUE"),
         (("--bench", "a.toml", "--set", "servo=maybe"), "servo: 'maybe' is neither yes nor no"),
         (("--bench", "a.toml", "b.toml"), "give the new rig's file alone"),
@@ -170,3 +173,43 @@ def test_what_cannot_be_a_bench_is_refused_in_a_line(
     assert done.returncode == 2
     assert said in " ".join(done.stderr.split())
     assert files(tmp_path) == set()
+
+
+def swept(rate_Hz: float = 50.0) -> dict[str, np.ndarray]:
+    """Return a log of 20 s of a control with friction and a spring, but no breakout."""
+    t = np.arange(round(20.0 * rate_Hz)) / rate_Hz
+    x = 0.05 * np.sin(0.4 * np.pi * t)
+    force = 2000.0 * x + 5.0 * np.sign(np.cos(0.4 * np.pi * t))
+    return {"time_s": t, "column_force_N": force, "column_deflection_m": x}
+
+
+def test_a_rig_from_a_log_has_its_rate_and_a_number_that_it_determines_as_0(tmp_path: Path) -> None:
+    pl.DataFrame(swept()).write_csv(tmp_path / "log.csv")
+    done = coupled(tmp_path, "new", "rig", "--from", "log.csv", "yoke.toml")
+    assert done.returncode == 0, done.stderr
+    rig = read_rig(tmp_path / "yoke.toml")
+    column = rig.controls["column"]
+    assert (rig.frame_rate, column.loader.breakout) == (50.0, 0.0)
+    assert "loader.breakout_N" not in column.guesses
+    assert column.loader.friction == pytest.approx(5.0, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "said"),
+    [
+        ("time_s", lambda t: 1e3 * t, "runs at 0.05 Hz: is it in milliseconds?"),
+        ("time_s", lambda t: np.where(t > 5.0, t + 1.0, t), "has a gap or a jump after 5.000 s"),
+        ("column_force_N", lambda f: -f, "moves against column_deflection_m"),
+        ("column_force_N", lambda f: np.where(f == f[7], np.nan, f), "row 9 holds no number"),
+    ],
+)
+def test_a_log_that_no_diagnosis_would_take_gives_no_rig(
+    tmp_path: Path, name: str, change: Callable[[np.ndarray], np.ndarray], said: str
+) -> None:
+    log = swept()
+    frame = pl.DataFrame(log | {name: change(log[name])}, nan_to_null=True)
+    frame.write_csv(tmp_path / "log.csv")
+    done = coupled(tmp_path, "new", "rig", "--from", "log.csv", "yoke.toml")
+    assert done.returncode == 2
+    assert f"log.csv: {name}: {said}" in " ".join(done.stderr.split())
+    assert files(tmp_path) == {"log.csv"}

@@ -11,6 +11,7 @@ import numpy as np
 import polars as pl
 import pytest
 
+import coupled
 from coupled.errors import InputError
 from coupled.record.record import (
     FORMAT,
@@ -120,3 +121,29 @@ def test_a_channel_of_the_users_own_is_kept(own: str) -> None:
 def test_a_second_sensor_beside_the_first_is_kept() -> None:
     names = ("time_s", "wheel_force_N", "wheel_force_2_N")
     assert record_of(dict.fromkeys(names, np.array([0.0, 0.1])), "record.csv").channels == names
+
+
+@pytest.mark.parametrize(
+    ("record", "said"),
+    [
+        (Record(("time_s", "column_force_N"), np.zeros((0, 2))), "holds no channel over time"),
+        (Record(("time_s", "column_force_N"), np.ones((9, 2))), "time_s: must rise"),
+        (Record(("time_s", "column_force_lb"), np.arange(8.0).reshape(4, 2)), "rename it to"),
+    ],
+)
+def test_a_record_that_no_file_could_hold_is_shown_and_refused(
+    tmp_path: Path, record: Record, said: str
+) -> None:
+    assert repr(record).startswith("Record(")
+    with pytest.raises(InputError, match=said):
+        write_record(record, tmp_path / "r.csv")
+    with pytest.raises(InputError, match=said):
+        coupled.diagnose("report-column", record)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_manifest_that_is_no_json_is_refused_with_its_key(tmp_path: Path) -> None:
+    record = Record(("time_s", "a"), np.arange(8.0).reshape(4, 2), {"b": 1, "c": np.arange(3)})
+    with pytest.raises(InputError, match=r"manifest\.c: is of type ndarray"):
+        write_record(record, tmp_path / "r.csv")
+    assert not list(tmp_path.iterdir())

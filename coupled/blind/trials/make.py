@@ -19,7 +19,7 @@ from coupled.blind.trials.trial import Plan, draw_trial, plans
 from coupled.blind.trials.truth import Truth, truth_from
 from coupled.blind.twin.setting import csv_text
 from coupled.errors import InputError
-from coupled.files import check_targets, read_json, read_text, write_text
+from coupled.files import check_targets, named, read_json, read_text, write_text
 from coupled.parallel import as_done, cores, executor
 from coupled.rig.rig import Rig
 from coupled.rig.rigwrite import rig_text
@@ -68,7 +68,7 @@ class Places:
     @property
     def parts(self) -> Path:
         """The folder of an unfinished make's notes."""
-        return self.key.with_name(self.key.name + ".parts")
+        return named(self.key).with_name(self.key.name + ".parts")
 
 
 @dataclass(frozen=True)

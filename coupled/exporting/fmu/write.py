@@ -70,6 +70,7 @@ def check_file(file: Path) -> None:
 
 def chosen_control(rig: Rig, control: str, file: object) -> ControlName:
     """Return the control to export: the named one, or the rig's only one."""
+    rig.check_controlled(file)
     names = list(rig.controls)
     if control and control not in names:
         raise InputError(file, "control", f"the rig has no {control!r}; {nearest(control, names)}")

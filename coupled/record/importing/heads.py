@@ -144,12 +144,13 @@ def _trimmed_from(text: str, delimiter: str, columns: Sequence[int]) -> float:
 
     An angle that no force can move within a frame then jumps once.
     """
-    lines = [line for line in text.splitlines() if line.strip()][1:5]
+    head, *lines = [line for line in text.splitlines() if line.strip()][:5]
+    width = len(head.split(delimiter))
     try:
         rows = np.array([[float(cell) for cell in line.split(delimiter)] for line in lines])
     except ValueError:
         return 0.0
-    if len(rows) < 4 or not columns:
+    if rows.shape != (4, width) or not columns:
         return 0.0
     first, *later = np.abs(np.diff(rows[:, list(columns)], axis=0))
     jumps = first > np.maximum(JUMPS * np.max(later, axis=0), LEAST_JUMP_rad)

@@ -9,6 +9,7 @@ the second is `name#2`.
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -92,9 +93,9 @@ def _flattened(
     found: dict[str, Any] = {}
     for name, cell in row.items():
         if isinstance(cell, Mapping):
-            inner = _flattened(path, number, cell, f"{before}{name}.", deep + 1)
+            inner = _flattened(path, number, cell, f"{before}{_unicode(name)}.", deep + 1)
         else:
-            inner = {f"{before}{name}": cell}
+            inner = {f"{before}{_unicode(name)}": cell}
         both = found.keys() & inner.keys()
         if both:
             problem = f"row {number} has two cells of this name: rename one"
@@ -124,8 +125,10 @@ def _column(name: str, cells: Sequence[Any]) -> pl.Series:
     given = [cell for cell in cells if cell is not None]
     if all(isinstance(cell, (int, float)) for cell in given):
         whole = all(isinstance(cell, int) and abs(cell) < 2**63 for cell in given)
-        kind = pl.Int64 if whole and given else pl.Float64
-        return pl.Series(name, cells, dtype=kind, strict=False)
+        if whole and given:
+            return pl.Series(name, cells, dtype=pl.Int64, strict=False)
+        numbers = [None if cell is None else _float(cell) for cell in cells]
+        return pl.Series(name, numbers, dtype=pl.Float64)
     if all(isinstance(cell, list) and all(map(_is_number, cell)) for cell in given):
         return pl.Series(name, cells, dtype=pl.List(pl.Float64), strict=False)
     return pl.Series(name, [None if c is None else _text(c) for c in cells], dtype=pl.String)
@@ -135,5 +138,18 @@ def _is_number(cell: Any) -> bool:
     return isinstance(cell, (int, float)) and not isinstance(cell, bool)
 
 
+def _float(cell: float) -> float:
+    """Return a number; one with more digits than a float can have is infinite."""
+    try:
+        return float(cell)
+    except OverflowError:
+        return math.inf if cell > 0 else -math.inf
+
+
 def _text(cell: Any) -> str:
-    return cell if isinstance(cell, str) else json.dumps(cell)
+    return _unicode(cell) if isinstance(cell, str) else json.dumps(cell)
+
+
+def _unicode(text: str) -> str:
+    r"""Return a text with "?" for each half of a character, as "\ud800" in JSON."""
+    return text.encode("utf-8", "replace").decode()

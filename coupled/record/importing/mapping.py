@@ -270,6 +270,9 @@ def _check_stamps(clock: Stamped, path: Path, key: str) -> None:
     if clock.date and clock.date != "iso" and "%" not in clock.date:
         problem = f'is {clock.date[:40]!r}; give "iso", or a pattern as "%d.%m.%Y %H:%M:%S.%f"'
         raise InputError(path, f"{key}.date", problem)
+    directives = re.findall("%(.)", clock.date or "")
+    if doubled := next((one for one in directives if directives.count(one) > 1 and one != "%"), ""):
+        raise InputError(path, f"{key}.date", f"{clock.date[:40]!r} has %{doubled} twice")
 
 
 def dropped_rows(clock: Stamped, path: Path, key: str) -> list[tuple[int, int]]:

@@ -279,7 +279,11 @@ def _table(path: Path, kept: list[str], lines: Sequence[int], delimiter: str) ->
     try:
         return pl.read_csv(text, has_header=False, infer_schema=False, separator=delimiter)
     except (pl.exceptions.PolarsError, OSError, ValueError) as error:
-        width, *others = (len(row) for row in csv.reader(kept, delimiter=delimiter))
+        try:
+            width, *others = (len(row) for row in csv.reader(kept, delimiter=delimiter))
+        except csv.Error:
+            row = next((k for k, line in enumerate(kept) if line.count('"') % 2), 0)
+            raise InputError(path, "", f"row {lines[row]} has a quote that none closes") from None
         long = next((row for row, cells in enumerate(others, 1) if cells > width), None)
         if long is None or len(others) + 1 != len(kept):  # a cell contained a line end
             raise InputError(path, "", f"is not a table: {first_line(error)}") from None

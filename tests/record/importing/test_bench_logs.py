@@ -135,3 +135,14 @@ def test_a_constant_has_a_unit_and_stands_in_the_account(tmp_path: Path) -> None
     assert (said["from"], said["doubts"]) == ("value 2500", [])
     with pytest.raises(InputError, match="at least one needs from"):
         made(tmp_path, json.dumps(ROWS), '[clock]\nfrom = "t"\n[channels.load_factor]\nvalue = 1.0')
+
+
+def test_json_text_of_half_a_character_is_read_and_an_endless_number_refused(
+    tmp_path: Path,
+) -> None:
+    odd = [row | {"note\ud800": "\ud800"} for row in ROWS]
+    assert len(made(tmp_path, json.dumps(odd))) == len(ROWS)
+    with pytest.raises(InputError, match=r"joint\.torque: row 5 holds no finite number"):
+        rows = json.loads(json.dumps(ROWS))
+        rows[4]["joint"]["torque"] = 10**400
+        made(tmp_path, json.dumps(rows))

@@ -53,6 +53,7 @@ LOGS: dict[str, tuple[str, str | bytes, str]] = {
     "time back": ("log.csv", edited(7, "20,1,1"), "T: row 8: time goes back"),
     "time nan": ("log.csv", edited(7, "nan,1,1"), "T: row 8 has no time"),
     "a long gap": ("log.csv", "\n".join(LINES[:9] + LINES[20:]), "11 rows are missing"),
+    "an open quote": ("log.csv", edited(7, '100,"1,1') + "\n" + "9" * 140_000, "row 8 has a quote"),
     "ragged": ("log.csv", edited(7, "100,1,1,1,1,1"), "row 8 has 6 cells, the first row 3"),
     "cut short": ("log.csv", GOOD[: len(GOOD) // 2] + "\n9999", "log.csv"),
     "no log": ("nolog.xyz", GOOD, "its format is not known"),

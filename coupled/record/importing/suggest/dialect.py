@@ -83,7 +83,11 @@ def _decoded(path: Path, content: bytes) -> tuple[Literal["utf-8", "latin-1", "u
 def _split(line: str, delimiter: str) -> list[str]:
     if delimiter == " ":
         return line.split()
-    return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter), [])]
+    try:
+        cells = next(csv.reader([line], delimiter=delimiter), [])
+    except csv.Error:  # a quote that nothing closes, before very many cells
+        cells = line.split(delimiter)
+    return [cell.strip() for cell in cells]
 
 
 def _delimiter(lines: Sequence[str], path: Path) -> tuple[str, int]:
