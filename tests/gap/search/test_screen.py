@@ -28,6 +28,7 @@ def pulses(times: NDArray[np.float64], begun_s: float) -> NDArray[np.float64]:
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("offset_N", "push_N", "begun_s"),
     [(-1.0, 22.0, 2.0), (-0.5, 22.0, 2.0), (0.5, 28.0, 14.0)],
