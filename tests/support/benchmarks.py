@@ -107,8 +107,8 @@ def _frame_parts() -> str:
         return ""
     more = [rig + rest for rig, rest in zip(part["rig"], part["rest"], strict=True)]
     return (
-        f" Of the {min(more):.1f} to {max(more):.1f} µs more with one control, the loader alone"
-        f" takes {max(part['rig']):.1f}; the rest appears only beside the aircraft."
+        f" One control adds {min(more):.1f} to {max(more):.1f} µs; a loader without aircraft"
+        f" takes {max(part['rig']):.1f}."
     )
 
 
