@@ -359,7 +359,7 @@ def _fit_neighbours(beam: Beam, fitted: Fit, library: Sequence[Effect], wanted: 
     """
     found, is_best = fitted, names_of(fitted.effects) == beam.best
     beside = _candidates(found.effects, library, wanted)
-    fitted, screened = _screened(beam, found, beside)
+    fitted, screened = _worth_a_fit(beam, found, beside)
     doubtful = is_best and not screened
     if doubtful:
         screened = beam.screen.best(fitted, beside, Worth(0.0, beam.counts), TRIES)
@@ -392,7 +392,9 @@ def _fit_neighbours(beam: Beam, fitted: Fit, library: Sequence[Effect], wanted: 
     _fit_sets(beam, others)
 
 
-def _screened(beam: Beam, found: Fit, candidates: Sequence[Effect]) -> tuple[Fit, list[Screened]]:
+def _worth_a_fit(
+    beam: Beam, found: Fit, candidates: Sequence[Effect]
+) -> tuple[Fit, list[Screened]]:
     """Return the candidates worth a fit beside a set, and the set as it is beside them.
 
     Its nuisance parameters are within their tolerance: beyond it they may have absorbed an effect.

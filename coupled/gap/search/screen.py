@@ -1,8 +1,9 @@
 """Screening: select effects that may explain a residual, by projection on their signatures.
 
 A signature is the change of the residual that an effect of a given size makes. Signatures are
-computed at sizes over three decades, since friction, play and rate limits are strongly nonlinear in
-their size. The projection is independent of scale. A fit starts from the size of least residual.
+computed at sizes over three decades, in both directions, since friction, play and rate limits are
+strongly nonlinear in their size; of effects near the best, also at the size that the projection
+predicts. The projection is independent of scale. A fit starts from the size of least residual.
 
 The power of the projection is the statistic of the score test, and gives the predicted gain in
 log-likelihood (Rao, Math. Proc. Camb. Phil. Soc. 44, 1948). An effect is fitted only if this gain
