@@ -114,7 +114,7 @@ def make(
 def _make(
     places: Places, numbers: Numbers, progress: Progress, workers: Executor, ahead: int
 ) -> None:
-    deck, pool = _drawn(numbers)
+    deck, pool = drawn(numbers)
     for name, rig in pool.items():
         remark = "The nominal rig: what a record's real one is held against"
         write_text(places.folder / RIGS / f"{name}.toml", rig_text(rig, remark))
@@ -161,14 +161,14 @@ def record_name(i: int) -> str:
 
 def make_one(numbers: Numbers, i: int, plan: Plan) -> tuple[int, Truth, str]:
     """Return a record's number and truth, and the record as CSV."""
-    deck, pool = _drawn(numbers)
+    deck, pool = drawn(numbers)
     seed = (numbers.seed, 3, i)
     trial = draw_trial(np.random.default_rng(seed), plan, deck, pool)
     return i, replace(trial.truth, seed=seed), csv_text(trial.record)
 
 
 @lru_cache(maxsize=1)
-def _drawn(numbers: Numbers) -> tuple[Deck, Mapping[str, Rig]]:
+def drawn(numbers: Numbers) -> tuple[Deck, Mapping[str, Rig]]:
     """Return the deck of a set and its rigs, cached in each worker."""
     deck = read_deck(numbers.version)
     others = numbers.rigs if deck.whole is None else 0

@@ -305,10 +305,13 @@ def _fit_neighbours_of_best(beam: Beam, library: Sequence[Effect]) -> None:
 
     A set with one effect less starts at the optimum of the best set, also if it is known: its first
     fit may have ended at a local minimum. A law of several parameters may be equivalent to two
-    effects of fewer parameters, so they are fitted as well. Repeat while the best set changes.
+    effects of fewer parameters, so they are fitted as well. Repeat with each new best set. The best
+    set may be that of an earlier round again, since the effective samples change with the sets.
     """
-    while beam.best:
-        best, fitted = beam.best, beam.fits[beam.best]
+    done = set[Names]()
+    while beam.best and beam.best not in done:
+        done.add(beam.best)
+        fitted = beam.fits[beam.best]
         fewer = [one for one in _sets_without_one(fitted) if one[0]]
         swapped = _sets_with_swap(beam, fitted, library)
         _fit_sets(beam, [*fewer, *swapped, *_sets_with_other_law(beam, fitted, library)])
@@ -322,8 +325,6 @@ def _fit_neighbours_of_best(beam: Beam, library: Sequence[Effect]) -> None:
                     [t for one in screened for t in _starts_with_one_more(beam, part, one)],
                 )
         _finish(beam)
-        if beam.best == best:
-            return
 
 
 def _numbers(fitted: Fit) -> int:

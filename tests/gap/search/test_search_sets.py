@@ -7,8 +7,11 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
+from coupled.blind.trials.make import Numbers, drawn
+from coupled.blind.trials.trial import draw_trial, plans
 from coupled.gap.diagnose import Diagnosis, diagnose
 from coupled.gap.effects.library import BY_NAME
 from coupled.gap.search.beam import _choose
@@ -121,3 +124,19 @@ def test_what_no_record_separates_is_ambiguous(tmp_path: Path) -> None:
     found = answer(tmp_path, {"force_offset": {"offset_N": 4.0}}, 9, rigid)
     assert found.verdict == "ambiguous"
     assert {"force_offset", "force_zero"} <= set(found.rivals[0])
+
+
+@pytest.mark.slow
+def test_the_search_ends_where_two_sets_take_turns_as_the_best() -> None:
+    """The effective samples change with the sets, and with them the order of near ones."""
+    numbers = Numbers(seed=2077, records=200, rigs=24, version=4)
+    deck, pool = drawn(numbers)
+    plan = plans(np.random.default_rng([numbers.seed, 1]), numbers.records, deck)[50]
+    trial = draw_trial(np.random.default_rng((numbers.seed, 3, 50)), plan, deck, pool)
+    told = list[str]()
+
+    def tell(task: str, done: int, of: int) -> None:
+        told.append(task)
+        assert len(told) < 2000, "the search does not end"
+
+    assert diagnose(trial.rig, {"r": trial.record}, tell=tell).verdict == "unexplained"
