@@ -191,6 +191,7 @@ from coupled.record.record import Record, write_record
 resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))
 data = np.random.default_rng(1).standard_normal((20_000, 3)).cumsum(axis=0)
 try:
+    data[:, 0] = np.arange(20_000) / 120
     write_record(Record(("time_s", "a", "b"), data), Path(sys.argv[1]))
 except InputError as error:
     print(error)

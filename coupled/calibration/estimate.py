@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -96,10 +97,10 @@ class Instruments:
     meter_step: float
 
     def __post_init__(self) -> None:
-        """Refuse errors below 0, and those of no instrument. Raises InputError."""
+        """Refuse errors below 0. Raises InputError."""
         for name, error in vars(self).items():
-            if not 0.0 <= error <= 10.0:
-                raise InputError("instruments", name, f"is {error:g}; give 0 to 10")
+            if not 0.0 <= error < math.inf:
+                raise InputError("instruments", name, f"is {error:g}; give 0, or a number above it")
 
     def deflection_variance(self, deflection: Floats, looks: Floats | float = 1.0) -> Floats:
         """Return the variance of the mean of `looks` readings of the ruler, d².

@@ -176,7 +176,8 @@ def _bench(
     units: System,
 ) -> None:
     """Write a rig without an aircraft; on a terminal, prompt for numbers not given."""
-    from coupled.gap.checks import check_record, frame_rate_of
+    from coupled.gap.checks import check_record
+    from coupled.record.samples import frame_rate_of
     from coupled.rig.rigfile import rig_from_table
     from coupled.schema import loads_toml
     from coupled.surveying.benchrig import answer, bench_rig, questions, split_answers, yes

@@ -49,6 +49,7 @@ from coupled.record.channels import (
 )
 from coupled.record.importing import plausible
 from coupled.record.record import Record
+from coupled.record.samples import FINER, check_samples, sampling_rate_of
 from coupled.resources import aircraft_folder
 from coupled.rig.equations import specified_gradient
 from coupled.rig.parameters import Flight
@@ -59,7 +60,6 @@ from coupled.schema import changed, file_keys
 
 SPEED = "true_airspeed_m_per_s"
 ELEVATOR = surface_channel("column")
-FINER = {1e3: "milliseconds", 1e6: "microseconds", 1e9: "nanoseconds"}  # how many in a second
 
 
 def check_record(
@@ -76,7 +76,7 @@ def check_record(
         if regressor is not None and regressor not in record:
             problem = f"has no channel {regressor}, the regressor of the rig file"
             raise InputError(file, "", f"{problem}; {nearest(regressor, record.channels)}")
-    rate = rate_of(record, file)
+    rate = sampling_rate_of(record, file)
     if abs(rate / rig.frame_rate - 1.0) > TINY:
         slower = rig.frame_rate / rate
         unit = next((unit for n, unit in FINER.items() if abs(slower / n - 1.0) <= TINY), "")
@@ -90,38 +90,6 @@ def check_record(
         _check_angles(record, file)
     if rig.controls and moved:
         _check_channels(rig, record, control, file)
-
-
-def rate_of(record: Record, file: object) -> float:
-    """Return the rows in a second. Raises InputError if there are too few, or time stands still."""
-    steps = np.diff(record.time_s)
-    if not (steps.size and float(np.median(steps)) > 0.0):
-        problem = f"does not rise over {len(record)} rows; a record has one row at each time"
-        raise InputError(file, TIME, problem)
-    return 1.0 / float(np.median(steps))
-
-
-def frame_rate_of(record: Record, file: object) -> float:
-    """Return a record's rate, Hz. Raises InputError if it is no frame rate of a rig."""
-    rate_Hz = rate_of(record, file)
-    if not 1.0 <= rate_Hz <= 1e4:
-        unit = next((unit for n, unit in FINER.items() if 1.0 <= rate_Hz * n <= 1e4), "")
-        asked = f"is it in {unit}?" if unit else "a rig has 1 to 10000 Hz"
-        raise InputError(file, TIME, f"runs at {rate_Hz:.4g} Hz: {asked}")
-    span_s = float(record.time_s[-1] - record.time_s[0])
-    return float(f"{(len(record) - 1) / span_s:.6g}")
-
-
-def check_samples(record: Record, file: object) -> None:
-    """Raise InputError if a record's time has a gap, or one of its cells holds no number."""
-    time = record.time_s
-    gap = np.flatnonzero(np.abs(np.diff(time) * rate_of(record, file) - 1.0) > NEGLIGIBLE)
-    if gap.size:
-        raise InputError(file, TIME, f"has a gap or a jump after {time[gap[0]]:.3f} s")
-    for name in record.channels:
-        if not np.all(np.isfinite(record[name])):
-            row = int(np.argmax(~np.isfinite(record[name])))
-            raise InputError(file, name, f"row {row + 2} holds no number")
 
 
 def _check_angles(record: Record, file: object) -> None:
@@ -452,7 +420,7 @@ def at_rate_of(rig: Rig, records: Mapping[str, Record]) -> Rig:
     """Return the rig with the frame rate of the first record, and steps per frame by its own."""
     assert rig.flight is not None
     file, record = next(iter(records.items()))
-    rate_Hz = rate_of(record, file)
+    rate_Hz = sampling_rate_of(record, file)
     if abs(rate_Hz / rig.frame_rate - 1.0) <= TINY:
         return rig
     wanted = rig.frame_rate * rig.flight.steps_per_frame / rate_Hz

@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 from coupled.errors import InputError
-from coupled.gap.checks import check_samples
 from coupled.record.channels import ControlName, channel
 from coupled.record.record import Record
+from coupled.record.samples import check_samples
 
 Floats = NDArray[np.float64]
 _WINDOWS_s = (0.2, 0.8)  # short ones for mass and damping, long ones for the gradient

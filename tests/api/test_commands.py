@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
-from math import nan
+from math import inf, nan
 from pathlib import Path
 from typing import Any
 
@@ -182,13 +182,14 @@ def test_a_calibration_of_another_control_goes_into_no_rig() -> None:
     [("precision", -1.0), ("precision", nan), ("strongest_N", nan), ("crossed_N", -1.0)],
 )
 def test_a_plan_refuses_numbers_out_of_range(name: str, value: float) -> None:
+    asked: Any = {name: value}
     with pytest.raises(InputError, match=rf"coupled\.plan: {name}: is .*; give "):
-        coupled.plan("report-column", **{name: value})  # type: ignore[arg-type]
+        coupled.plan("report-column", **asked)
     with pytest.raises(InputError, match=rf"coupled\.bench: {name}: is .*; give "):
-        coupled.bench("report-column", **{name: value})  # type: ignore[arg-type]
+        coupled.bench("report-column", **asked)
 
 
-@pytest.mark.parametrize("error", [-1.0, nan, 11.0])
+@pytest.mark.parametrize("error", [-1.0, nan, inf])
 def test_an_instrument_has_no_error_below_0(error: float) -> None:
-    with pytest.raises(InputError, match=r"instruments: meter: is .*; give 0 to 10"):
+    with pytest.raises(InputError, match=r"instruments: meter: is .*; give 0, or"):
         replace(usual_instruments("column"), meter=error)

@@ -123,4 +123,4 @@ def test_the_guide_counts_the_effects() -> None:
     text = (Path(__file__).parents[2] / "docs" / "guides" / "diagnose.md").read_text(
         encoding="utf-8"
     )
-    assert f"which of {len(EFFECTS)} effects causes it" in text
+    assert f"its cause among {len(EFFECTS)} effects" in text

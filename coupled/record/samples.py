@@ -1,0 +1,44 @@
+"""The rows of a record in time: their rate, and whether all of them are there."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from coupled.errors import InputError
+from coupled.record.channels import TIME
+from coupled.record.record import Record
+
+FINER = {1e3: "milliseconds", 1e6: "microseconds", 1e9: "nanoseconds"}  # how many in a second
+UNEVEN = 0.01  # of a step in time, from which rows are missing
+
+
+def sampling_rate_of(record: Record, file: object) -> float:
+    """Return the rows in a second. Raises InputError if there are too few, or time stands still."""
+    steps = np.diff(record.time_s)
+    if not (steps.size and float(np.median(steps)) > 0.0):
+        problem = f"does not rise over {len(record)} rows; a record has one row at each time"
+        raise InputError(file, TIME, problem)
+    return 1.0 / float(np.median(steps))
+
+
+def frame_rate_of(record: Record, file: object) -> float:
+    """Return a record's rate, Hz. Raises InputError if it is no frame rate of a rig."""
+    rate_Hz = sampling_rate_of(record, file)
+    if not 1.0 <= rate_Hz <= 1e4:
+        unit = next((unit for n, unit in FINER.items() if 1.0 <= rate_Hz * n <= 1e4), "")
+        asked = f"is it in {unit}?" if unit else "a rig has 1 to 10000 Hz"
+        raise InputError(file, TIME, f"runs at {rate_Hz:.4g} Hz: {asked}")
+    span_s = float(record.time_s[-1] - record.time_s[0])
+    return float(f"{(len(record) - 1) / span_s:.6g}")
+
+
+def check_samples(record: Record, file: object) -> None:
+    """Raise InputError if a record's time has a gap, or one of its cells holds no number."""
+    time = record.time_s
+    gap = np.flatnonzero(np.abs(np.diff(time) * sampling_rate_of(record, file) - 1.0) > UNEVEN)
+    if gap.size:
+        raise InputError(file, TIME, f"has a gap or a jump after {time[gap[0]]:.3f} s")
+    for name in record.channels:
+        if not np.all(np.isfinite(record[name])):
+            row = int(np.argmax(~np.isfinite(record[name])))
+            raise InputError(file, name, f"row {row + 2} holds no number")
