@@ -112,6 +112,8 @@ def freed(rig: Rig, control: ControlName, key: str) -> Effect:
     if section not in STAGE_OF_SECTION or (section == "flight" and rig.flight is None):
         hint = nearest(section, STAGE_OF_SECTION)
         raise InputError("--free", key, f'is no number to fit: give "loader.mass_kg"; {hint}')
+    if section != "flight" and control not in rig.controls:
+        raise InputError("--free", key, f"the rig has no {control}")
     fields = _fields(rig, control, section)
     if last not in fields:
         raise InputError("--free", key, f"unknown key; {nearest(last, fields)}")

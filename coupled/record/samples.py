@@ -10,6 +10,7 @@ from coupled.record.record import Record
 
 FINER = {1e3: "milliseconds", 1e6: "microseconds", 1e9: "nanoseconds"}  # how many in a second
 UNEVEN = 0.01  # of a step in time, from which rows are missing
+SLOWEST_Hz, FASTEST_Hz = 10.0, 1e4  # a hand moves at up to some 2 Hz: five rows a period at least
 
 
 def sampling_rate_of(record: Record, file: object) -> float:
@@ -22,11 +23,12 @@ def sampling_rate_of(record: Record, file: object) -> float:
 
 
 def frame_rate_of(record: Record, file: object) -> float:
-    """Return a record's rate, Hz. Raises InputError if it is no frame rate of a rig."""
+    """Return a record's rate, Hz. Raises InputError if it is too low or high for a control's."""
     rate_Hz = sampling_rate_of(record, file)
-    if not 1.0 <= rate_Hz <= 1e4:
-        unit = next((unit for n, unit in FINER.items() if 1.0 <= rate_Hz * n <= 1e4), "")
-        asked = f"is it in {unit}?" if unit else "a rig has 1 to 10000 Hz"
+    if not SLOWEST_Hz <= rate_Hz <= FASTEST_Hz:
+        finer = [unit for n, unit in FINER.items() if SLOWEST_Hz <= rate_Hz * n <= FASTEST_Hz]
+        needed = f"a control is recorded at {SLOWEST_Hz:g} to {FASTEST_Hz:g} Hz"
+        asked = f"is it in {finer[0]}?" if finer else needed
         raise InputError(file, TIME, f"runs at {rate_Hz:.4g} Hz: {asked}")
     span_s = float(record.time_s[-1] - record.time_s[0])
     return float(f"{(len(record) - 1) / span_s:.6g}")

@@ -21,6 +21,7 @@ from scipy.optimize import nnls
 
 from coupled.errors import InputError
 from coupled.record.channels import ControlName, channel
+from coupled.record.importing.plausible import size_doubt
 from coupled.record.record import Record
 from coupled.record.samples import check_samples
 
@@ -57,7 +58,8 @@ def numbers_from_log(record: Record, control: ControlName, file: object) -> LogN
     """Return a control's numbers by a record of it that was moved slowly and let go.
 
     The record needs the force, and the deflection or the computed one. Raises InputError, which
-    names `file`, where it has not both, a cell is empty, or the control hardly moves.
+    names `file`, where it has not both, a cell is empty, a deflection is in
+    another unit, or the control hardly moves.
     """
     force_name, deflections = channel(control, "force"), ("deflection", "computed")
     names = [channel(control, each) for each in deflections]
@@ -71,6 +73,10 @@ def numbers_from_log(record: Record, control: ControlName, file: object) -> LogN
     travel = float(np.max(np.abs(x)))
     if travel <= 0.0 or float(np.ptp(force)) <= 0.0:
         raise InputError(file, there[0], f"the {control} does not move, or no force acts on it")
+    for name in there:
+        if (doubt := size_doubt(name, record[name])) is not None:
+            most = float(np.max(np.abs(record[name])))
+            raise InputError(file, name, f"reaches {most:.3g}, and {doubt}; give it in its unit")
     columns, found, errors = _fitted(record.time_s, x, force, travel, file)
     values = dict(zip(columns, found, strict=True))
     limits = dict.fromkeys(columns, 0.0)

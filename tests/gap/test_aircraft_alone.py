@@ -162,6 +162,8 @@ def test_a_number_of_an_aircraft_alone_is_fitted_at_the_rate_of_the_log(healthy:
     assert abs(number.found - 1.0) < number.half < 0.05
     with pytest.raises(InputError, match=r"--free: the rig has an aircraft only: give its keys"):
         fit(alone(), slow)
+    with pytest.raises(InputError, match=r"--free: loader\.mass_kg: the rig has no column"):
+        fit(alone(), slow, free=["loader.mass_kg"])
 
 
 def test_terms_without_an_aircraft_are_refused(healthy: Record) -> None:

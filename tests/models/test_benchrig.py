@@ -198,6 +198,7 @@ def test_a_rig_from_a_log_has_its_rate_and_a_number_that_it_determines_as_0(tmp_
     ("name", "change", "said"),
     [
         ("time_s", lambda t: 1e3 * t, "runs at 0.05 Hz: is it in milliseconds?"),
+        ("column_deflection_m", lambda x: 1e3 * x, "reaches 50, and looks like mm, cm or in"),
         ("time_s", lambda t: np.where(t > 5.0, t + 1.0, t), "has a gap or a jump after 5.000 s"),
         ("column_force_N", lambda f: -f, "moves against column_deflection_m"),
         ("column_force_N", lambda f: np.where(f == f[7], np.nan, f), "row 9 holds no number"),

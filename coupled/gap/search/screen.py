@@ -262,9 +262,10 @@ class Screen:
     def _refine(self, current: Fit, effects: Sequence[Effect]) -> None:
         """Add signatures of other sizes than the usual ones, of effects that need no flight.
 
-        Sizes beyond them are tried of all effects. Of those whose projections are then near the
-        largest, so are the sizes that the projections predict: a residual that is not linear in a
-        size is predicted at that of least residual. Single limits have sizes of their own.
+        Larger sizes are tried of all these effects. Of those whose projections are then near the
+        largest, the sizes that the projections predict are tried too: if a residual is not linear
+        in a size, its gain is predicted well only near the size of least residual. Single limits
+        have sizes of their own.
         """
         some = [e for e in effects if not (STAGE_OF[e.stage].flown or e.seen or is_limit(e))]
         in_threads(lambda effect: self._refine_one(current, effect, False), some)
@@ -281,10 +282,10 @@ class Screen:
         return max((float(now @ a) ** 2 / size for a, size in each if size > enough), default=0.0)
 
     def _refine_one(self, current: Fit, effect: Effect, by_projection: bool) -> None:
-        """Add signatures of larger sizes, or of projected ones, while these leave less.
+        """Add signatures of larger sizes, or of predicted ones, while they reduce the residual.
 
-        They are a start of their own, of shape `~shape`: beside other effects the size among the
-        usual ones may be right.
+        Their best size is a further start of the fit, of shape `~shape`, since beside other effects
+        one of the usual sizes may be right.
         """
         now, found = _residual(self.problem, effect, current.rig), list[_Signature]()
         known = self.known[effect.name]

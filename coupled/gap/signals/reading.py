@@ -90,7 +90,7 @@ class Sensed:
         if of.scale_drift == 0.0:
             return of.read_scale
         times_s = np.arange(samples, dtype=np.float64) / rate_Hz
-        # A search may try a drift that leaves nothing of the reading: it is not divided by 0.
+        # The search may try a drift by which the scale would reach 0, and nothing is divided by 0.
         return np.asarray(of.read_scale * np.maximum(1.0 + of.scale_drift * times_s, NEGLIGIBLE))
 
     def force(self, recorded: Floats) -> Floats:

@@ -88,6 +88,13 @@ def test_the_row_before_jsbsims_trim_is_left_out(tmp_path: Path, mark: str) -> N
         assert record["pitch_rad"][0] == pytest.approx(0.05)
 
 
+def test_short_rows_below_a_head_of_jsbsim_are_refused(tmp_path: Path) -> None:
+    rows = [f"{0.1 * i:.1f},100" for i in range(9)]
+    (tmp_path / "log.csv").write_text("\n".join(["Time,q bar (psf),Alpha (deg)", *rows]) + "\n")
+    with pytest.raises(InputError, match=r"log\.csv: Alpha \(deg\): is empty"):
+        import_log(tmp_path / "log.csv")
+
+
 def test_flightgears_log_has_seconds_and_property_paths(tmp_path: Path) -> None:
     time = 12.5 + np.arange(120) / 60.0
     theta = 3.0 * np.sin(time)

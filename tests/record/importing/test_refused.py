@@ -117,6 +117,7 @@ MAPS: dict[str, tuple[str, str, str]] = {
     "delay": ("sign = -1", "delay_s = -1", "channels.column_force_N.delay_s"),
     "clock unit": ('"ms"', '"N"', "clock.unit: 'N' is a force"),
     "day": ('"ms"', '"day"', "clock.unit: 'day' is no known unit; known: d, h, min, ms, ns, s, us"),
+    "date twice": ('unit = "ms"', 'date = "%H:%M:%M"', "clock.date: '%H:%M:%M' has %M twice"),
     "clock column": ('"T"', '"TT"', "clock.from: log.csv has no 'TT'"),
     "two clocks": ('unit = "ms"', "rate_Hz = 60", "give either from"),
     "no clock": ('from = "T"', "", "give either from"),
