@@ -181,6 +181,7 @@ def test_a_healthy_record_of_three_controls_has_no_gap() -> None:
     json.dumps(table)
 
 
+@pytest.mark.slow
 def test_a_control_that_its_breakout_holds_is_not_judged_and_hides_no_gap() -> None:
     """It was *ambiguous*: nothing of its loader shows, as of a control that no one touches."""
     rig = noisy(package.load_rig("737"))

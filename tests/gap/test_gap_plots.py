@@ -125,6 +125,7 @@ def labels(figure: Figure) -> list[str]:
     return [text for axes in shown for text in (axes.get_xlabel(), axes.get_ylabel()) if text]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "effect",
     # Drawn where a rig has them: test_gravity (a wheel), test_regressor (a channel in the file).

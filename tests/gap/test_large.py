@@ -31,6 +31,7 @@ def test_a_large_effect_is_named_with_its_size(name: str, tmp_path: Path) -> Non
         assert one.value == pytest.approx(value, rel=0.03), key
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("filed", "bend", "limit"), [(0.0, 5e-6, 5e-4), (6e-5, 6e-5, 3e-3), (0.0, 2e-4, 6e-3)]
 )
