@@ -55,16 +55,14 @@ Values = dict[str, float]
 class Screened(NamedTuple):
     """A candidate, the starts of its fits, and the projection of the residual on its signature.
 
-    `taken` is the power of the projection, noise floors², `gain` the predicted log-likelihood gain,
-    `direction` the signature with the largest projection, of unit length. `refitted` as in
-    `_screened`.
+    `taken` is the power of the projection, noise floors², `gain` the predicted log-likelihood gain.
+    `refitted` as in `_screened`.
     """
 
     effect: Effect
     starts: list[Values]
     taken: float
     gain: float
-    direction: Floats
     refitted: bool
 
 
@@ -210,7 +208,6 @@ class Screen:
             return self._gain(ours, now, left, samples)
 
         taken, gain, starts = 0.0, 0.0, dict[int, tuple[float, Values]]()
-        direction = np.zeros(len(now))
         for values, shape, whole in self.known[effect.name]:
             size = float(whole @ whole)
             # A limit that is never reached does not change the residual.
@@ -221,8 +218,7 @@ class Screen:
                 continue
             size = float(change @ change)
             share = float(now @ change) / size
-            if share**2 * size >= taken:
-                taken, direction = share**2 * size, change / math.sqrt(size)
+            taken = max(taken, share**2 * size)
             gain = max(gain, gain_to(now - share * change))
             left = float((now + change) @ (now + change))
             # A slope's start has a usual size; the projection gives its sign, or a smaller size.
@@ -231,7 +227,7 @@ class Screen:
             if shape not in starts or left < starts[shape][0]:
                 starts[shape] = left, _times(self.problem, effect, values, times)
         found = [values for _, values in starts.values()]
-        return Screened(effect, found, taken, gain, direction, refitted)
+        return Screened(effect, found, taken, gain, refitted)
 
     def _signatures(self, current: Fit, effect: Effect) -> list[_Signature]:
         """Return an effect's signatures with the current effects.
