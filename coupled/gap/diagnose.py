@@ -56,10 +56,10 @@ Records = Mapping[str, Record]
 
 def diagnose(
     rig: Rig,
-    records: Mapping[str, Record],
+    records: Records,
     control: ControlName | None = None,
     tell: Tell | None = None,
-    healthy: Mapping[str, Record] | None = None,
+    healthy: Records | None = None,
     workers: int = 0,
     terms: bool = False,
 ) -> Diagnosis:
@@ -69,8 +69,7 @@ def diagnose(
     present task, and the numbers of tasks done and in all. With records of the `healthy` machine,
     the change since then is judged. `workers` is the number of threads, 0 for one per core; the
     result does not depend on it. With `terms`, the named functions of the model's aerodynamics are
-    tried. Raises InputError if a record cannot be of this rig, or if no
-    stage can be judged.
+    tried. Raises InputError if a record cannot be of this rig, or if no stage can be judged.
     """
     if terms and rig.flight is None:
         raise InputError(rig.name, TERMS_OPTION, "the rig has no aircraft; leave it out")
@@ -93,12 +92,12 @@ def diagnose(
         baselines = _airframe_first(list(well), reference, lambda known: known.rig)
 
         def diagnosed(part: Part, flight: Flight | None) -> PartDiagnosis:
-            told, baseline = _told(tell, part, parts), baselines.get(part)
-            made = prepare(rig, parts[part], part, told, baseline, flight, terms)
+            told = _told(tell, part, parts)
+            made = prepare(rig, parts[part], part, told, baselines.get(part), flight, terms)
             return findings(made, *search(made.case, made.library))
 
         found = _airframe_first(list(parts), diagnosed, lambda known: known.improved)
-        made = [found[part] for part in parts]
+        made = (found[part] for part in parts)
         each = [replace(one, left_out=(*one.left_out, *words)) for one in made]
     if len(each) == 1:
         return each[0]
@@ -206,9 +205,7 @@ def _airframe_first(
     return found | dict(zip(rest, in_threads(lambda part: work(part, flight), rest), strict=True))
 
 
-def _of_parts(
-    rig: Rig, records: Mapping[str, Record], parts: Sequence[Part]
-) -> dict[Part, Mapping[str, Record]]:
+def _of_parts(rig: Rig, records: Records, parts: Sequence[Part]) -> dict[Part, Records]:
     """Return the healthy records of each part; a control that none of them moves has none."""
     if len(parts) == 1:
         return {parts[0]: records}
@@ -228,26 +225,22 @@ def _told(tell: Tell | None, part: Part, parts: Collection[Part]) -> Tell | None
 
 def findings(prepared: Prepared, case: Case, choice: Choice) -> PartDiagnosis:
     """Return the diagnosis from a search; `case` has the final noise floors."""
-    rig, control, readers = case.nominal, case.control, prepared.readers
-    part = prepared.part
-    outputs = list(case.outputs)
-    judge = Judge(readers, outputs, choice, case.gaps(choice.fit.rig))
+    part, readers, baseline = prepared.part, prepared.readers, prepared.baseline
+    fit, outputs = choice.fit, list(case.outputs)
+    judge = Judge(readers, outputs, choice, case.gaps(fit.rig))
     stages = _of_part(part, judge.stages())
     effects = effects_of(case, choice, readers, stages)
     if unsure := incredible(choice, effects):
         stages = _of_part(part, replace(judge, doubted=unsure).stages())
-    own, found = Descent("own"), choice.fit
-    fitted = Problem(case).fit(found.effects, found.values, descent=own, part="fitted")
+    fitted = Problem(case).fit(fit.effects, fit.values, descent=Descent("own"), part="fitted")
     floors = floors_of(case, choice)
-    budgets = [
-        stage_budget(stage.name, case, choice.without_effects, choice.fit, floors)
-        for stage in stages
-        if stage.guilty
-    ]
+    faulty = [stage.name for stage in stages if stage.guilty]
+    budgets = [stage_budget(name, case, choice.without_effects, fit, floors) for name in faulty]
     budget = tuple(one for one in budgets if one is not None)
-    baseline, records = prepared.baseline, list(prepared.records.values())
-    outputs_now = prepared.case.outputs
-    change = None if baseline is None else baseline.compared(records, outputs_now, part.own)
+    change = None
+    if baseline is not None:
+        records = list(prepared.records.values())
+        change = baseline.compared(records, prepared.case.outputs, part.own)
     verdict = verdict_of(choice, stages, effects, budget)
     verdict, stages = beside_healthy(verdict, stages, baseline, change)
     curves = None
@@ -266,10 +259,10 @@ def findings(prepared: Prepared, case: Case, choice: Choice) -> PartDiagnosis:
             for s in choice.steps
             if s.rivals
         ),
-        settings=settings_of(choice, rig, control, outputs),
+        settings=settings_of(choice, case.nominal, case.control, outputs),
         shrink=shrink(case, fitted, floors),
-        nominal=rig,
-        improved=choice.fit.rig,
+        nominal=case.nominal,
+        improved=fit.rig,
         records=dict(prepared.records),
         outputs=tuple(outputs),
         choice=choice,
@@ -278,7 +271,7 @@ def findings(prepared: Prepared, case: Case, choice: Choice) -> PartDiagnosis:
         trim=prepared.trim,
         filtered={name: one for each in filtered for name, one in each},
         left_out=prepared.left_out,
-        inseparable=inseparable(choice.fit, control),
+        inseparable=inseparable(fit, case.control),
         curved=curves,
     )
 

@@ -24,14 +24,17 @@ from coupled.gap.checks import at_rate_of, check_record, trimmed
 from coupled.gap.effects.effect import (
     BY_REGRESSOR,
     Effect,
-    Parameter,
-    Signature,
+    dotted,
+    entry,
+    fields_of,
     keys_of,
+    section_of,
     touched,
+    value,
 )
-from coupled.gap.effects.library import BY_NAME, EFFECTS, LAG, SETTINGS, STAMP
+from coupled.gap.effects.library import BY_NAME, EFFECTS, LAG
 from coupled.gap.effects.linkage import SERVO
-from coupled.gap.effects.settings import Scales, in_scale
+from coupled.gap.effects.settings import CLOCK, Scales, in_scale
 from coupled.gap.prepare import as_driven, readers_of
 from coupled.gap.search.case import Case, Tell
 from coupled.gap.search.fit import fit_set
@@ -46,11 +49,11 @@ from coupled.gap.thresholds import (
     NORMAL_95,
     SERVO_START_Hz,
 )
-from coupled.record.channels import ControlName, unit_of
+from coupled.record.channels import ControlName
 from coupled.record.record import Record
 from coupled.results import Plain, TableResult, frame_of
 from coupled.rig.rig import Rig
-from coupled.schema import LARGEST, Section, file_keys
+from coupled.schema import LARGEST, Section
 
 if TYPE_CHECKING:
     import polars as pl
@@ -88,7 +91,7 @@ def default_keys(
     a regressor that the file does not name. With imposed motion (`moved`) of the linkage only the
     play shows.
     """
-    fields = {f: key for key, f in _fields(rig, control, "loader").items()}
+    fields = {f: key for key, f in fields_of(rig, control, "loader").items()}
     loader, drive = rig.controls[control].loader, rig.controls[control].drive
     absent: set[str] = {"basic_gradient"} if loader.basic_gradient == 0.0 else set()
     if loader.servo_frequency == 0.0:
@@ -114,10 +117,10 @@ def freed(rig: Rig, control: ControlName, key: str) -> Effect:
         raise InputError("--free", key, f'is no number to fit: give "loader.mass_kg"; {hint}')
     if section != "flight" and control not in rig.controls:
         raise InputError("--free", key, f"the rig has no {control}")
-    fields = _fields(rig, control, section)
+    fields = fields_of(rig, control, section)
     if last not in fields:
         raise InputError("--free", key, f"unknown key; {nearest(last, fields)}")
-    holder: Any = rig.flight if section == "flight" else getattr(rig.controls[control], section)
+    holder = section_of(rig, control, section)
     filed = getattr(holder, fields[last])
     if not isinstance(filed, float):
         raise InputError("--free", key, "is not a single number; only such are fitted")
@@ -126,14 +129,8 @@ def freed(rig: Rig, control: ControlName, key: str) -> Effect:
         stage = "linkage"
     start = filed or _usual_start(key, control)
     low, high = _bounds(holder, fields[last], start)
-    number = Parameter("", key, "value", low, high, (min(max(start, low), high),))
-    return Effect(key, stage, (number,), Signature("", ""))
-
-
-def _fields(rig: Rig, control: ControlName, section: str) -> dict[str, str]:
-    holder = rig.flight if section == "flight" else getattr(rig.controls[control], section)
-    assert isinstance(holder, Section)
-    return file_keys(type(holder), unit_of(control))
+    number = value("", key, low, high, min(max(start, low), high))
+    return entry(stage, key, ("", ""), number)
 
 
 def _usual_start(key: str, control: ControlName) -> float:
@@ -311,10 +308,9 @@ def fit_nominal(
         problem = "holds too little to judge any stage by, so nothing can be fitted"
         raise InputError(next(iter(records)), "", problem)
     judged = {output.stage for output in outputs}
-    moved = readers[0].moved
-    if moved or any(output.in_series for output in outputs):
+    if readers[0].moved or any(output.in_series for output in outputs):
         judged.add("linkage")
-    chosen = tuple(keys) or default_keys(rig, control, judged, moved)
+    chosen = tuple(keys) or default_keys(rig, control, judged, readers[0].moved)
     scales = Scales.of(readers) if control in rig.controls else None
     effects: list[Effect] = []
     for key in chosen:
@@ -341,21 +337,20 @@ def fit_nominal(
         fits = fitter.fitted(effects)
         numbers |= {one.key: one for one in fits.numbers}
     held = fits.held
-    clock = {SETTINGS[STAMP].value_key(p) for p in SETTINGS[STAMP].free}
+    clock = CLOCK.value_key(CLOCK.free[0])
     together = [one for group in groups.values() for one in alike(group)]
     found = tuple(numbers.values())
     used = [output for output in outputs if output.stage in shown_in]
     files = list(records)
     known = _with_fitted(filed, control, found)
     fitted = {one.key for one in found if one.half is not None}
-    doubts = _doubts_of_servo(known, control, fitted, held.rig, used)
     return NominalFit(
         control,
         known,
         found,
-        tuple(one for one in together if clock.isdisjoint(one.keys)),
+        tuple(one for one in together if clock not in one.keys),
         tuple(_channel(output, rig, held.rig, files[output.record]) for output in used),
-        doubts,
+        _doubts_of_servo(known, control, fitted, held.rig, used),
     )
 
 
@@ -410,12 +405,11 @@ class _Fitter:
         The error is a nuisance parameter within the tolerance of a recorder's clocks. Without it a
         lag of a fraction of a frame is fitted as friction. A free delay of the force stands for it.
         """
-        clock = SETTINGS[STAMP]
-        (number,) = clock.free
+        (number,) = CLOCK.free
         timed = {number.key, BY_NAME[LAG].free[0].key}
-        loader = any({*clock.shows_in} & {*effect.shows_in} for effect in effects)
-        beside = [clock] if loader and timed.isdisjoint(keys_of(effects)) else []
-        priors = {clock.value_key(number): (0.0, number.high / NORMAL_95)}
+        loader = any({*CLOCK.shows_in} & {*effect.shows_in} for effect in effects)
+        beside = [CLOCK] if loader and timed.isdisjoint(keys_of(effects)) else []
+        priors = {CLOCK.value_key(number): (0.0, number.high / NORMAL_95)}
         case = Case(self.rig, self.control, outputs)
         return fit_set(case, effects, beside, priors, start or {}, part=part)
 
@@ -452,27 +446,20 @@ def _doubts_of_servo(
         reasons.append(
             f"a servo's damping ratio is at least {LEAST_SERVO_RATIO:g}, and this one would ring"
         )
-    none = _without_servo(held, control)
-    if none is not None:
-        with_servo, without = (_held_out_rms(used, rig) for rig in (held, none))
-        if without <= with_servo * (1.0 + NEGLIGIBLE):
+    try:
+        none = held.changed({f"controls.{control}.{SERVO}": 0.0})
+    except InputError:
+        pass  # the rig has other parameters of a servo
+    else:
+        if _held_out_rms(used, none) <= _held_out_rms(used, held) * (1.0 + NEGLIGIBLE):
             reasons.append("without a servo the held-out stretches are predicted as well")
     if not reasons:
         return ()
-    found_as = (
+    return (
         f"servo_frequency_Hz = {loader.servo_frequency:.3g} with servo_damping_ratio ="
         f" {loader.servo_damping_ratio:.2g} is no servo: {'; '.join(reasons)}."
+        " For a machine without a servo leave out both keys, and fit again",
     )
-    advice = " For a machine without a servo leave out both keys, and fit again"
-    return (found_as + advice,)
-
-
-def _without_servo(rig: Rig, control: ControlName) -> Rig | None:
-    """Return a rig without its servo; None if it has other parameters of a servo."""
-    try:
-        return rig.changed({f"controls.{control}.loader.servo_frequency_Hz": 0.0})
-    except InputError:
-        return None
 
 
 def _held_out_rms(used: Sequence[Output], rig: Rig) -> float:
@@ -501,8 +488,7 @@ def _with_fitted(rig: Rig, control: ControlName, numbers: Sequence[Number]) -> R
     data = rig.controls[control]
     changes: dict[str, Any] = {}
     for one in numbers:
-        at = one.key if one.key.startswith("flight.") else f"controls.{control}.{one.key}"
-        changes[at] = one.found
+        changes[dotted(one.key, control)] = one.found
         if "basic_gradient" in one.key:
             host = f"controls.{control}.compensation.{one.key.partition('.')[2]}"
             changes[host] = data.assumed_basic_gradient
@@ -516,12 +502,6 @@ def _with_fitted(rig: Rig, control: ControlName, numbers: Sequence[Number]) -> R
 
 def _channel(output: Output, before: Rig, after: Rig, file: str) -> ChannelFit:
     """Return the error of a channel's prediction on held-out stretches."""
-    rms = [float(np.sqrt(np.mean(output.residual(r, "held") ** 2))) for r in (before, after)]
-    return ChannelFit(
-        file,
-        output.channel,
-        rms[0] * output.floor,
-        rms[1] * output.floor,
-        output.floor,
-        float(np.std(output.measured)),
-    )
+    floor, moves = output.floor, float(np.std(output.measured))
+    error, fitted = (_held_out_rms([output], rig) * floor for rig in (before, after))
+    return ChannelFit(file, output.channel, error, fitted, floor, moves)

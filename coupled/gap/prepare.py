@@ -107,14 +107,15 @@ def prepare(
     if not rig.controls:
         records = motion_alone(records)
         rig = at_rate_of(rig, records)
-    rig = as_driven(rig, list(records.values()), control) if control in rig.controls else rig
+    each = list(records.values())
+    rig = as_driven(rig, each, control) if control in rig.controls else rig
     rig, trim = trimmed(rig, records)
     for file, record in records.items():
         check_record(rig, record, control, file, moved=part.own)
         if rig.flight is not None:
             check_trim(trim_speed(rig), record, file)
     if rig.controls:
-        rig = as_counted(rig, list(records.values()), control)
+        rig = as_counted(rig, each, control)
     else:
         check_moved_by_pilot(rig)
     judged = Judged(rig, part, readers_of(rig, records, control), baseline)
@@ -124,19 +125,18 @@ def prepare(
     if not outputs:
         raise InputError(next(iter(records)), "", _too_little(rig, control, judged.readers))
     check_against_model(outputs, rig, list(records))
-    left_out = [words for one in live for words in one.left_out]
+    left_out = [why for one in live for why in one.left_out]
     for file, record in records.items() if part.own else ():
         left_out += clipped(record, control, file)
-    if any(output.stage == AIRFRAME for output in outputs):
-        left_out += [words for words in [not_judged(list(records.values()))] if words]
+    if any(output.stage == AIRFRAME for output in outputs) and (words := not_judged(each)):
+        left_out.append(words)
     library = [one for one in library_of(rig, control) if part.frees(keys_of([one]))]
     if terms and part.airframe:
         library = with_terms(library, rig, records)
-    library = tried_effects(library, judged.readers, outputs)
     return Prepared(
         part,
         Case(rig, control, outputs, tell, judged.under, model_error_in_floors=baseline is not None),
-        tuple(library),
+        tuple(tried_effects(library, judged.readers, outputs)),
         tuple(judged.readers),
         records,
         trim,
@@ -279,9 +279,9 @@ def as_counted(rig: Rig, records: Collection[Record], control: ControlName) -> R
     found = dict(known)
     for quantity, zero in ZEROS.items():
         name, key = channel(control, quantity), zero.format(d=unit_of(control))
-        counts = [_count(record, name) for record in records if name in record]
-        if key not in known and counts and max(counts) > 0.0:
-            found[key] = max(counts)
+        most = max((_count(one, name) for one in records if name in one), default=0.0)
+        if key not in known and most > 0.0:
+            found[key] = most
     return rig if found == known else rig.changed({f"controls.{control}.tolerance": found})
 
 

@@ -12,7 +12,8 @@ from coupled.blind.twin.revision2 import REVISION_2
 from coupled.errors import InputError
 from coupled.gap.chain import STAGES, stage_of
 from coupled.gap.effects.effect import Effect, apply, possible, value_of
-from coupled.gap.effects.library import BY_NAME, EFFECTS, SETTINGS
+from coupled.gap.effects.library import BY_NAME, EFFECTS
+from coupled.gap.effects.settings import settings
 from coupled.plots.signals import SIGNALS
 from coupled.record.channels import CONTROL_NAMES
 from coupled.rig.parameters import Control
@@ -73,9 +74,9 @@ def test_an_effect_is_entered_under_its_keys_and_nothing_else(effect: Effect, fl
             assert value_of(same, control, p.key) == value_of(rig, control, p.key)
 
 
-def test_every_stage_and_name_is_listed_once() -> None:
+def test_every_stage_and_name_is_listed_once(flown: Rig) -> None:
     assert len(BY_NAME) == len(EFFECTS)
-    assert set(SETTINGS) == {e.name for e in EFFECTS if any(p.tolerance for p in e.free)}
+    assert set(settings(flown, "column")) == {e.name for e in EFFECTS if any(p.tolerance for p in e.free)}
     assert set(BY_NAME) - IN_NO_TRIAL <= set(TWIN_OF)
     for effect in EFFECTS:
         assert set(effect.contains) <= set(BY_NAME)

@@ -9,12 +9,10 @@ from coupled.gap.effects.effect import (
     TERMS,
     Drawing,
     Effect,
-    Parameter,
     Sampled,
-    Signature,
     added,
+    entry,
     factor,
-    one,
     value,
 )
 from coupled.gap.signals.air import (
@@ -28,10 +26,10 @@ _ROLL, _YAW, _SLIP = "roll_rate_rad_per_s", "yaw_rate_rad_per_s", "sideslip_rad"
 TERM = "term"  # the name of an effect of a named function, in the JSON
 _NEEDS = {"ROLL": (_ROLL,), "YAW": (_YAW,), "SIDE": (_SLIP,), "Y": (_SLIP,)}
 _DRAWN = {
-    "ROLL": Signature("roll_rate", "roll_left", "law", 4.0),
-    "YAW": Signature("yaw_rate", "yaw_left", "law", 4.0),
-    "SIDE": Signature("sideslip", "yaw_left", "law", 4.0),
-    "PITCH": Signature("alpha", "pitch_rate", "loop", 4.0),
+    "ROLL": ("roll_rate", "roll_left", "law", 4.0),
+    "YAW": ("yaw_rate", "yaw_left", "law", 4.0),
+    "SIDE": ("sideslip", "yaw_left", "law", 4.0),
+    "PITCH": ("alpha", "pitch_rate", "loop", 4.0),
 }
 
 
@@ -46,14 +44,14 @@ def _factor_on(
 ) -> Effect:
     """Return the effect of a factor of the rig's `flight` section."""
     number = factor(f"flight.{name}", start, *bounds)
-    return one("airframe", name, number, x, y, drawing, 4.0, needs=needs)
+    return entry("airframe", name, (x, y, drawing, 4.0), number, needs=needs)
 
 
 def _gust(name: str, key: str, drawn: str, needs: tuple[str, ...]) -> Effect:
     """Return the effect of gusts, by the key of their rms."""
     number = value("rms_m_per_s", f"flight.{key}", 0, 30, 0.5)
     error = Sampled(spread_of_crossing_air if name == "lateral_gust" else spread_of_air)
-    return one("airframe", name, number, "", drawn, "time", 6.0, needs=needs, sampled=error)
+    return entry("airframe", name, ("", drawn, "time", 6.0), number, needs=needs, sampled=error)
 
 
 AIRFRAME: tuple[Effect, ...] = (
@@ -75,11 +73,9 @@ AIRFRAME: tuple[Effect, ...] = (
     _factor_on("roll_inertia", 1.1, "aileron", "roll_rate", "loop", (_ROLL,)),
     _factor_on("pitch_inertia", 1.1, "elevator", "pitch_rate", "loop"),
     _factor_on("yaw_inertia", 1.1, "rudder", "yaw_rate", "loop", (_YAW,)),
-    one(
-        "airframe",
-        "center_of_gravity",
+    entry(
+        *("airframe", "center_of_gravity", ("alpha", "pitch_rate", "loop", 4.0)),
         added("aft_m", "flight.cg_aft_m", -2.0, 2.0, 0.02),
-        *("alpha", "pitch_rate", "loop", 4.0),
     ),
     _gust("vertical_gust", "gust_rms_m_per_s", "air", NEEDS),
     _gust("lateral_gust", "lateral_gust_rms_m_per_s", "crossing_air", NEEDS_ACROSS),
@@ -91,7 +87,7 @@ def term(function: str, axis: str) -> Effect:
 
     That of a lateral axis needs the motion of the axis.
     """
-    number = Parameter("factor", f"flight.{TERMS}{function}", "factor", 0.0, 10.0, (0.9,))
-    drawn = _DRAWN.get(axis, Signature("alpha", "load_answer", "loop", 4.0))
+    number = factor(f"flight.{TERMS}{function}", 0.9, 0.0)
+    drawn = _DRAWN.get(axis, ("alpha", "load_answer", "loop", 4.0))
     needs = _NEEDS.get(axis, ())
-    return Effect(f"{TERM} {function}", "airframe", (number,), drawn, needs=needs, of=function)
+    return entry("airframe", f"{TERM} {function}", drawn, number, needs=needs, of=function)

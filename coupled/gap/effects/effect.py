@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import partial
 from math import hypot
 from typing import Any, Literal, NamedTuple
 
@@ -142,9 +142,8 @@ class Parameter:
 
         The lower bound of an `added` parameter that cannot be negative removes the nominal value.
         """
-        if self.mode == "added" and self.low == 0.0:
-            return -float(self.nominal(rig, control)), self.high
-        return self.low, self.high
+        removes = self.mode == "added" and self.low == 0.0
+        return -float(self.nominal(rig, control)) if removes else self.low, self.high
 
     def error(self, value: float, rig: Rig, control: ControlName) -> float:
         """Return the smallest standard error of a value, from its model error."""
@@ -260,28 +259,31 @@ class Effect:
         return all(any(n in record for n in names) for record in records for names in wanted)
 
 
-@cache
-def _fields(section: type[Section], d: str) -> dict[str, str]:
-    return file_keys(section, d)
-
-
 def value_of(rig: Rig, control: ControlName, key: str) -> Any:
     """Return a rig's value of a key of a control, or of the flight."""
     section, _, last = key.partition(".")
+    holder = section_of(rig, control, section)
     if section == "flight" and last.startswith(TERMS):
-        assert rig.flight is not None
-        return rig.flight.terms.get(last.removeprefix(TERMS), 1.0)
-    holder = rig.flight if section == "flight" else getattr(rig.controls[control], section)
+        return holder.terms.get(last.removeprefix(TERMS), 1.0)
     return getattr(holder, field_of(rig, control, key)) if last else holder
+
+
+def section_of(rig: Rig, control: ControlName, section: str) -> Any:
+    """Return a section of a control, or the flight."""
+    return rig.flight if section == "flight" else getattr(rig.controls[control], section)
+
+
+def fields_of(rig: Rig, control: ControlName, section: str) -> dict[str, str]:
+    """Return {key in a rig file: field} of a section of a control, or of the flight."""
+    holder = section_of(rig, control, section)
+    assert isinstance(holder, Section), section
+    return file_keys(type(holder), unit_of(control))
 
 
 def field_of(rig: Rig, control: ControlName, key: str) -> str:
     """Return the name of a key's field, without its unit."""
     section, _, last = key.partition(".")
-    d = unit_of(control)
-    holder = rig.flight if section == "flight" else getattr(rig.controls[control], section)
-    assert isinstance(holder, Section), key
-    return _fields(type(holder), d)[last.format(d=d)]
+    return fields_of(rig, control, section)[last.format(d=unit_of(control))]
 
 
 def regressor_unit(rig: Rig, control: ControlName) -> str:
@@ -406,25 +408,16 @@ def factor(
     return Parameter("factor", key, "factor", low, high, (start,), **options)
 
 
-def added(
-    name: str, key: str, low: float, high: float, *starts: float, **options: Any
+def _number(
+    mode: Mode, name: str, key: str, low: float, high: float, *starts: float, **options: Any
 ) -> Parameter:
-    """Return a parameter that is added to the rig's value."""
-    return Parameter(name, key, "added", low, high, starts, **options)
+    """Return a parameter with a value, with more fields of `Parameter` as options."""
+    return Parameter(name, key, mode, low, high, starts, **options)
 
 
-def value(
-    name: str, key: str, low: float, high: float, *starts: float, **options: Any
-) -> Parameter:
-    """Return a parameter that replaces the rig's value."""
-    return Parameter(name, key, "value", low, high, starts, **options)
-
-
-def limit(
-    name: str, key: str, low: float, high: float, *starts: float, **options: Any
-) -> Parameter:
-    """Return a limit: a smaller value has a larger effect."""
-    return value(name, key, low, high, *starts, kind="limit", **options)
+# Parameters that are added to the rig's value, that replace it, and limits that replace it.
+added, value = partial(_number, "added"), partial(_number, "value")
+limit = partial(value, kind="limit")
 
 
 def real_bend(start: float, above: str = "") -> Parameter:
@@ -433,27 +426,15 @@ def real_bend(start: float, above: str = "") -> Parameter:
     return value("bend_{d}_per_N", key, 0, 1e-2, start, role="other", above=above)
 
 
-def switch(key: str, on: Any) -> Switch:
-    """Return a parameter without a value, which sets a key."""
-    return Switch("", key, "switch", on=on)
-
-
-def one(
-    stage: str,
-    name: str,
-    parameter: Parameter,
-    x: str,
-    y: str,
-    drawing: Drawing = "law",
-    zoom_s: float = 2.5,
-    **options: Any,
+def entry(
+    stage: str, name: str, drawn: tuple[Any, ...], *parameters: Parameter, **options: Any
 ) -> Effect:
-    """Return an effect of one parameter, drawn as y against x, with more fields of `Effect`."""
-    return Effect(name, stage, (parameter,), Signature(x, y, drawing, zoom_s), **options)
+    """Return an effect, with `drawn` the fields of its `Signature`, and more of `Effect`."""
+    return Effect(name, stage, parameters, Signature(*drawn), **options)
 
 
 def setting_of(
-    effect: Effect, low: float, high: float, neutral: float = 1.0, every_output: bool = False
+    effect: Effect, low: float, high: float, neutral: float, every_output: bool = False
 ) -> Effect:
     """Return an effect's parameter as a nuisance parameter between two values.
 

@@ -17,14 +17,12 @@ from coupled.gap.effects.effect import (
     UNIT,
     Effect,
     Sampled,
-    Signature,
     added,
+    entry,
     factor,
     keys_of,
     limit,
-    one,
     regressor_unit,
-    setting_of,
     value,
 )
 from coupled.gap.effects.linkage import LINKAGE, without_servo
@@ -40,138 +38,97 @@ MOTION = "motion_skew"
 STAMP, LAG = "force_skew", "transport_delay"
 WHOLE_s = 1e4  # a zoom that shows the whole record
 
-
 EFFECTS: tuple[Effect, ...] = (
-    one(
-        "schedule",
-        "pressure_lag",
+    entry(
+        *("schedule", "pressure_lag", ("pressure", "gradient", "loop", 6.0)),
         value("lag_s", "schedule.pressure_lag_s", 0, 10, 0.3),
-        *("pressure", "gradient", "loop", 6.0),
     ),
-    one(
-        "schedule",
-        "pressure_scale",
+    entry(
+        *("schedule", "pressure_scale", ("pressure", "gradient", "law", WHOLE_s)),
         factor("schedule.pressure_scale", 1.05),
-        *("pressure", "gradient", "law", WHOLE_s),
     ),
-    one(
-        "schedule",
-        "schedule_slope",
+    entry(
+        *("schedule", "schedule_slope", ("pressure", "gradient", "law", WHOLE_s)),
         factor("schedule.slope", 1.05),
-        *("pressure", "gradient", "law", WHOLE_s),
     ),
     *LOADER,
-    one(
-        "sensing",
-        "deflection_scale",
+    entry(
+        *("sensing", "deflection_scale", ("computed", "computed_left")),
         factor("sensing.deflection_scale", 1.03),
-        *("computed", "computed_left"),
         of_sensor=True,
     ),
-    one(
-        "sensing",
-        "force_scale",
+    entry(
+        *("sensing", "force_scale", ("force", "missing")),
         factor("sensing.force_scale", 1.03),
-        *("force", "missing"),
         outputs=("loader", "linkage"),
     ),
-    one(
-        "sensing",
-        "force_zero",
+    entry(
+        *("sensing", "force_zero", ("force", "missing")),
         added("offset_N", "sensing.force_zero_N", -100, 100, 1.0),
-        *("force", "missing"),
         outputs=("loader", "linkage"),
     ),
-    one(
-        "sensing",
-        "deflection_zero",
+    entry(
+        *("sensing", "deflection_zero", ("computed", "deflection_left")),
         added("offset_{d}", "sensing.deflection_zero_{d}", -0.2, 0.2, 1e-3),
-        *("computed", "deflection_left"),
         outputs=("linkage",),
     ),
-    one(
-        "sensing",
-        "scale_drift",
+    entry(
+        *("sensing", "scale_drift", ("computed", "computed_left", "loop", WHOLE_s)),
         added("per_s", "sensing.scale_drift_per_s", -0.05, 0.05, 1e-3),
-        *("computed", "computed_left", "loop", 1e4),
         of_sensor=True,
     ),
-    Effect(
-        "mains_hum",
-        "sensing",
-        (
-            added("amplitude_{d}", "sensing.hum_{d}", 0, 0.1, 1e-4),
-            # The start sets the scale of difference steps, 0.1 Hz.
-            value(
-                *("frequency_Hz", "sensing.hum_frequency_Hz", 5, 1000, 0.1),
-                role="other",
-                kind="aliased",
-                model_error=EXACT,
-            ),
-            value(
-                *("phase_rad", "sensing.hum_phase_rad", -7, 7, 1.0),
-                role="other",
-                model_error=EXACT,
-            ),
+    entry(
+        *("sensing", "mains_hum", ("", "computed_left", "time", 0.2)),
+        added("amplitude_{d}", "sensing.hum_{d}", 0, 0.1, 1e-4),
+        # The start sets the scale of difference steps, 0.1 Hz.
+        value(
+            *("frequency_Hz", "sensing.hum_frequency_Hz", 5, 1000, 0.1),
+            role="other",
+            kind="aliased",
+            model_error=EXACT,
         ),
-        Signature("", "computed_left", "time", 0.2),
+        value("phase_rad", "sensing.hum_phase_rad", -7, 7, 1.0, role="other", model_error=EXACT),
         seen=hums,
         of_sensor=True,
     ),
-    one(
-        "sensing",
-        "force_skew",
+    entry(
+        *("sensing", STAMP, ("speed", "missing")),
         added("delay_s", "sensing.force_stamp_s", -0.3, 0.3, 0.01, tolerance=CLOCK_s),
-        *("speed", "missing"),
         outputs=("loader", "linkage"),
     ),
-    one(
-        "sensing",
-        "motion_skew",
+    entry(
+        *("sensing", MOTION, ("elevator", "pitch_rate", "loop", 4.0)),
         added("delay_s", "flight.motion_stamp_s", -0.4, 0.4, 0.05, tolerance=CLOCK_s),
-        *("elevator", "pitch_rate", "loop", 4.0),
         outputs=("airframe",),
     ),
     *LINKAGE,
-    one(
-        "compensation",
-        "dropped_frames",
+    entry(
+        *("compensation", "dropped_frames", ("", "estimate_left", "time", 0.5)),
         added("share", "compensation.missed_share", 0, 0.9, 0.3, model_error=EXACT),
-        *("", "estimate_left", "time", 0.5),
         outputs=("schedule", "multiplier", "compensation"),
         sampled=Sampled(spread_of_missed, times_missed),
         seen=shares_missed,
     ),
-    one(
-        "surface",
-        "cable_stretch",
+    entry(
+        *("surface", "cable_stretch", ("pressure", "ratio")),
         added("loss_per_Pa", "rigging.stretch_loss_per_Pa", 0, 1e-2, 1e-5),
-        *("pressure", "ratio"),
     ),
-    one(
-        "surface",
-        "surface_lag",
+    entry(
+        *("surface", "surface_lag", ("wanted_rate", "answer_left", "law", 1.5)),
         added("lag_s", "rigging.lag_s", 0, 3, 0.05),
-        *("wanted_rate", "answer_left", "law", 1.5),
     ),
-    one(
-        "surface",
-        "surface_rate_limit",
+    entry(
+        *("surface", "surface_rate_limit", ("wanted_rate", "answer_rate", "law", 1.5)),
         limit("rate_norm_per_s", "rigging.rate_limit_norm_per_s", 1e-2, 50, 0.3, 0.55),
-        *("wanted_rate", "answer_rate", "law", 1.5),
     ),
-    one(
-        "surface",
-        "surface_freeplay",
+    entry(
+        *("surface", "surface_freeplay", ("wanted", "answer_left", "loop")),
         added("play_norm", "rigging.play_norm", 0, 0.5, 0.01, kind="saturating"),
-        *("wanted", "answer_left", "loop"),
     ),
     *AIRFRAME,
-    one(
-        "surface",
-        "rigging_offset",
+    entry(
+        *("surface", "rigging_offset", ("wanted", "answer_left")),
         added("offset_norm", "rigging.offset_norm", -0.5, 0.5, 0.01),
-        *("wanted", "answer_left"),
     ),
 )
 BY_NAME = {effect.name: effect for effect in EFFECTS}
@@ -185,12 +142,10 @@ def library_of(rig: Rig, control: ControlName) -> list[Effect]:
     without a servo has other effects of a servo (`without_servo`). The effects of a regressor have
     its unit in their names; a rig that names none has none of them.
     """
-    every = list(EFFECTS)
     if not rig.controls:
-        return [one for one in every if all(p.key.startswith("flight.") for p in one.parameters)]
-    if rig.controls[control].loader.servo_frequency == 0.0:
-        every = without_servo(EFFECTS)
+        return [one for one in EFFECTS if all(p.key.startswith("flight.") for p in one.parameters)]
     data, further = rig.controls[control], dict[str, tuple[str, ...]]()
+    every = list(EFFECTS) if data.loader.servo_frequency else without_servo(EFFECTS)
     if data.schedule.curved:
         of_schedule = (one.name for one in every if one.stage == "schedule")
         further |= dict.fromkeys(of_schedule, ("loader", "multiplier"))
@@ -215,18 +170,3 @@ def _of_regressor(every: Sequence[Effect], rig: Rig, control: ControlName) -> li
     if rig.controls[control].loader.regressor is None:
         return [one for one in every if one.name not in of_it]
     return [named(one) if one.name in of_it else one for one in every]
-
-
-def _ends(effect: Effect) -> tuple[float, float, float]:
-    """Return the tolerance limits of an effect's parameter, and its neutral value."""
-    neutral = 1.0 if effect.free[0].mode == "factor" else 0.0
-    tolerance = effect.free[0].tolerance
-    return neutral - tolerance, neutral + tolerance, neutral
-
-
-# {effect that frees the same key: nuisance parameter}, without tolerances of the rig file
-SETTINGS: dict[str, Effect] = {
-    effect.name: setting_of(effect, *_ends(effect))
-    for effect in EFFECTS
-    if effect.free and effect.free[0].tolerance > 0.0
-}

@@ -50,9 +50,7 @@ def hums(outputs: Sequence[Output], rig: Rig, control: ControlName) -> list[dict
         # A tone aliased from an odd Nyquist zone has the opposite phase direction.
         backwards = math.cos(turns - line.turn) < math.cos(turns + line.turn)
         phase = math.remainder(math.pi - line.phase, 2.0 * math.pi) if backwards else line.phase
-        return [
-            {"amplitude_{d}": line.amplitude, "frequency_Hz": tone_Hz, "phase_rad": phase},
-        ]
+        return [{"amplitude_{d}": line.amplitude, "frequency_Hz": tone_Hz, "phase_rad": phase}]
     return []
 
 
@@ -74,8 +72,7 @@ def ripples(outputs: Sequence[Output], rig: Rig, control: ControlName) -> list[d
         return np.concatenate([np.fft.ifft(answer * np.fft.fft(force)) for answer, force in each])
 
     laws = [[np.ones_like(w), w, np.abs(w), w**3] for w in ways]
-    smooth = np.column_stack([moved(law).real for law in zip(*laws, strict=True)])
-    smooth = np.linalg.qr(smooth)[0]
+    smooth = np.linalg.qr(np.column_stack([moved(law).real for law in zip(*laws, strict=True)]))[0]
     left = np.concatenate([output.residual(rig) * output.floor for output in ours])
     left = left - smooth @ (smooth.T @ left)
     span = max(float(np.ptp(way)) for way in ways)
@@ -159,12 +156,14 @@ def modes(outputs: Sequence[Output], rig: Rig, control: ControlName) -> list[dic
     Return none if no mode takes anything of it, such as without a force.
     """
     ours = [output for output in outputs if output.stage == "linkage"]
+    if not ours:
+        return []
     left = _bent(ours, rig, control, "bend_frequency_Hz", "bend_damping_ratio")
-    rigid = left(0.0, 0.0, 0.0) if ours else np.zeros(0)
+    rigid = left(0.0, 0.0, 0.0)
     fastest_Hz = min([MODES_Hz[1], *(0.5 * output.frame_rate_Hz for output in ours)])
     apart = math.log(1.0 + 2.0 * LIGHT)
     found, most = list[dict[str, float]](), 0.0
-    for rate in np.arange(math.log(MODES_Hz[0]), math.log(fastest_Hz), apart) if ours else ():
+    for rate in np.arange(math.log(MODES_Hz[0]), math.log(fastest_Hz), apart):
         frequency_Hz = math.exp(rate)
         bent = (rigid - left(BEND, frequency_Hz, LIGHT)) / BEND
         power, along = float(bent @ bent), float(bent @ rigid)
@@ -184,9 +183,11 @@ def saturations(
     K·x/tanh(x). Return none if no bend reduces the residual.
     """
     ours = [output for output in outputs if output.stage == "linkage"]
+    if not ours:
+        return []
     left = _bent(ours, rig, control, "bend_limit_{d}")
-    rigid = left(0.0, 0.0) if ours else np.zeros(0)
-    bent = (rigid - left(BEND, 0.0)) / BEND if ours else rigid
+    rigid = left(0.0, 0.0)
+    bent = (rigid - left(BEND, 0.0)) / BEND
     power, along = float(bent @ bent), float(bent @ rigid)
     if along <= 0.0:
         return []

@@ -23,15 +23,24 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from coupled.gap.effects.effect import BY_REGRESSOR, Effect, Parameter, Signature, setting_of
-from coupled.gap.effects.library import BY_NAME, EFFECTS, LAG
+from coupled.gap.effects.effect import BY_REGRESSOR, Effect, Parameter, entry, setting_of, value
+from coupled.gap.effects.library import BY_NAME, EFFECTS, LAG, STAMP
 from coupled.gap.noise.smooth import rate_of, smoothed
 from coupled.gap.signals.output import Output
 from coupled.gap.signals.reading import Reading
-from coupled.gap.thresholds import COLUMN_FORCE_N, COLUMN_WAY, MINOR, OTHER_SCALE, YIELDS_m
+from coupled.gap.thresholds import (
+    COLUMN_FORCE_N,
+    COLUMN_WAY,
+    MINOR,
+    OTHER_SCALE,
+    CLOCK_s,
+    YIELDS_m,
+)
 from coupled.record.channels import ControlName, unit_of
 from coupled.rig.rig import Rig
 
+# A time stamp error of the force, within the tolerance of a recorder's clocks.
+CLOCK = setting_of(BY_NAME[STAMP], -CLOCK_s, CLOCK_s, 0.0)
 CONTACT = ("loader.friction_stiffness_N_per_{d}", "loader.friction_elastic_share")
 
 
@@ -43,12 +52,12 @@ def settings(rig: Rig, control: ControlName, outputs: Sequence[Output] = ()) -> 
     """
     if not rig.controls:
         return {}
-    known = ((effect, _ends(effect, rig, control)) for effect in EFFECTS)
-    found = {
-        effect.name: setting_of(effect, *ends, every_output=_given(effect, rig, control))
-        for effect, ends in known
-        if ends is not None
-    }
+    given, found = rig.controls[control].tolerance, dict[str, Effect]()
+    for effect in EFFECTS:
+        if (ends := _ends(effect, rig, control)) is not None:
+            # A tolerance of a sensor in the rig file shows in several outputs.
+            every = effect.stage == "sensing" and effect.free[0].key_on(control) in given
+            found[effect.name] = setting_of(effect, *ends, every_output=every)
     if not any(output.in_series for output in outputs):
         return found
     return {
@@ -67,12 +76,6 @@ def lag_within_a_step(rig: Rig) -> Effect:
     return setting_of(BY_NAME[LAG], 0.0, step_s, 0.0)
 
 
-def _given(effect: Effect, rig: Rig, control: ControlName) -> bool:
-    """Tell whether the rig file has a tolerance of a sensor, which shows in several outputs."""
-    given = rig.controls[control].tolerance
-    return effect.stage == "sensing" and effect.free[0].key_on(control) in given
-
-
 def contact(rig: Rig, control: ControlName) -> tuple[Effect, ...]:
     """Return the presliding parameters as nuisance parameters; none if the rig file has them.
 
@@ -87,12 +90,11 @@ def contact(rig: Rig, control: ControlName) -> tuple[Effect, ...]:
     length = Parameter(
         "", CONTACT[0], "yields", 1e-3 * most, most, (0.1 * most, 0.01 * most), may_end=True
     )
-    share = Parameter(
-        "", CONTACT[1], "value", 0.0, 1.0 - MINOR, (loader.friction_elastic_share,), may_end=True
+    share = value("", CONTACT[1], 0.0, 1.0 - MINOR, loader.friction_elastic_share, may_end=True)
+    return (
+        entry("loader", "setting of the contact", ("", ""), length),
+        entry("loader", "setting of the contact's share", ("", ""), share),
     )
-    names = ("setting of the contact", "setting of the contact's share")
-    numbers = zip(names, (length, share), strict=True)
-    return tuple(Effect(name, "loader", (one,), Signature("", "")) for name, one in numbers)
 
 
 def most_yielding(control: ControlName) -> float:
@@ -114,28 +116,26 @@ def _ends(effect: Effect, rig: Rig, control: ControlName) -> tuple[float, float,
 
     None without a tolerance, and for an effect of several parameters.
     """
-    if len(effect.free) != 1 or len(effect.parameters) != 1:
+    if len(effect.parameters) != 1 or not effect.free:
         return None
     (number,) = effect.free
-    tolerance = number.tolerance
-    filed_tolerance = rig.controls[control].tolerance.get(number.key_on(control))
-    if filed_tolerance is None and tolerance <= 0.0:
+    given = rig.controls[control].tolerance.get(number.key_on(control))
+    tolerance = number.tolerance if given is None else given
+    if given is None and tolerance <= 0.0:
         return None
-    if number.mode == "factor" and not number.nominal(rig, control):
-        return None  # the rig lacks the component, such as a servo
     neutral = number.neutral(rig, control)
-    if filed_tolerance is not None:
+    if number.mode == "factor":
         filed = float(number.nominal(rig, control))
-        if number.mode == "factor":
-            tolerance = filed_tolerance / abs(filed) if filed else 0.0
-        else:
-            tolerance = filed_tolerance
-            # At most the filed value is removed: friction is not negative.
-            floor = -math.inf if number.low < 0.0 else -abs(filed)
-            floor = number.low if number.mode == "value" else floor
-            return max(neutral - tolerance, floor), neutral + tolerance, neutral
-    if tolerance <= 0.0:
-        return None
+        if filed == 0.0:
+            return None  # the rig lacks the component, such as a servo
+        tolerance = tolerance if given is None else given / abs(filed)
+        if tolerance <= 0.0:
+            return None
+    elif given is not None:
+        # At most the filed value is removed: friction is not negative.
+        floor = -math.inf if number.low < 0.0 else -abs(float(number.nominal(rig, control)))
+        floor = number.low if number.mode == "value" else floor
+        return max(neutral - tolerance, floor), neutral + tolerance, neutral
     return neutral - min(tolerance, 0.9), neutral + tolerance, neutral
 
 
@@ -205,9 +205,9 @@ class Scales:
         if powers is None:
             return 1.0
         usual = COLUMN_WAY[unit_of(control)]
-        force, way = self.force_N / COLUMN_FORCE_N, self.way / usual
-        like = [1.0 if 1.0 / OTHER_SCALE < r < OTHER_SCALE else r for r in (force, way)]
-        return float(like[0] ** powers[0] * (like[1] * usual / COLUMN_WAY["m"]) ** powers[1])
+        ratios = (self.force_N / COLUMN_FORCE_N, self.way / usual)
+        force, way = (1.0 if 1.0 / OTHER_SCALE < r < OTHER_SCALE else r for r in ratios)
+        return float(force ** powers[0] * (way * usual / COLUMN_WAY["m"]) ** powers[1])
 
 
 def in_scale(
@@ -216,12 +216,8 @@ def in_scale(
     """Return effects with starts and bounds scaled to a machine."""
     if scales is None:
         return list(effects)
-    return [
-        replace(
-            effect, parameters=tuple(_scaled(p, scales, rig, control) for p in effect.parameters)
-        )
-        for effect in effects
-    ]
+    scaled = (tuple(_scaled(p, scales, rig, control) for p in e.parameters) for e in effects)
+    return [replace(effect, parameters=p) for effect, p in zip(effects, scaled, strict=True)]
 
 
 def _scaled(p: Parameter, scales: Scales, rig: Rig, control: ControlName) -> Parameter:
@@ -245,21 +241,14 @@ def _scaled(p: Parameter, scales: Scales, rig: Rig, control: ControlName) -> Par
     return replace(p, low=low, high=high, starts=tuple(times * start for start in p.starts))
 
 
-def _powers(unit: str) -> tuple[float, float, float] | None:
+def _powers(unit: str) -> tuple[float, ...] | None:
     """Return the powers of force, motion and time in a unit such as N·s/m; None if unknown."""
     over, _, under = unit.partition("/")
     total = np.zeros(3)
     for side, part in ((1, over), (-1, under)):
         for token in filter(None, part.split("·")):
-            name, power = _split(token)
-            if name not in POWERS:
+            found = re.fullmatch(r"([A-Za-z]+|1)([²³23]?)", token)  # such as m³
+            if found is None or found[1] not in POWERS:
                 return None
-            total += side * power * np.array(POWERS[name])
-    force, way, time = total.tolist()
-    return force, way, time
-
-
-def _split(token: str) -> tuple[str, int]:
-    """Return the base unit and power of a part of a unit: m³ is (m, 3)."""
-    found = re.fullmatch(r"([A-Za-z]+|1)([²³23]?)", token)
-    return (found[1], EXPONENTS.get(found[2], 1)) if found else ("", 1)
+            total += side * EXPONENTS.get(found[2], 1) * np.array(POWERS[found[1]])
+    return tuple(total.tolist())
