@@ -190,9 +190,7 @@ def _beyond_noise(signal: Floats, least: float = 0.0) -> bool:
 
 
 def _airframe_first(
-    parts: Sequence[Part],
-    work: Callable[[Part, Flight | None], T],
-    rig_of: Callable[[T], Rig],
+    parts: Sequence[Part], work: Callable[[Part, Flight | None], T], rig_of: Callable[[T], Rig]
 ) -> dict[Part, T]:
     """Return the results of parts: of the airframe, and then of the controls side by side.
 

@@ -42,13 +42,7 @@ from coupled.gap.search.found import Alike, Fit, alike
 from coupled.gap.signals.output import Output, Part
 from coupled.gap.stages.airframe import airframe_outputs
 from coupled.gap.stages.tried import as_judged
-from coupled.gap.thresholds import (
-    FAR,
-    LEAST_SERVO_RATIO,
-    NEGLIGIBLE,
-    NORMAL_95,
-    SERVO_START_Hz,
-)
+from coupled.gap.thresholds import FAR, LEAST_SERVO_RATIO, NEGLIGIBLE, NORMAL_95, SERVO_START_Hz
 from coupled.record.channels import ControlName
 from coupled.record.record import Record
 from coupled.results import Plain, TableResult, frame_of
@@ -67,14 +61,12 @@ STAGE_OF_SECTION = {
     "flight": "airframe",
 }
 OF_LINKAGE = ("servo", "bend", "play", "arc", "structur", "contact")
-# The default parameters of a fit, by the stage that the records can judge.
-USUAL = {
-    "loader": (
-        *("mass", "damping", "basic_gradient", "friction", "offset", "delay"),
-        *("regressor_force", "regressor_friction"),
-    ),
-    "linkage": ("servo_frequency", "servo_damping_ratio", "bend", "play"),
-}
+# The default parameters of a fit, of the loader and of the linkage.
+USUAL_OF_LOADER = (
+    *("mass", "damping", "basic_gradient", "friction", "offset", "delay"),
+    *("regressor_force", "regressor_friction"),
+)
+USUAL_OF_LINKAGE = ("servo_frequency", "servo_damping_ratio", "bend", "play")
 # Parameters whose value 0 means that the component is absent: a fit stays above 0.
 NONE_AT_ZERO = (
     *("servo_frequency", "servo_rate_limit", "servo_acceleration_limit", "bend_frequency"),
@@ -92,21 +84,18 @@ def default_keys(
     play shows.
     """
     fields = {f: key for key, f in fields_of(rig, control, "loader").items()}
-    loader, drive = rig.controls[control].loader, rig.controls[control].drive
+    loader = rig.controls[control].loader
     absent: set[str] = {"basic_gradient"} if loader.basic_gradient == 0.0 else set()
     if loader.servo_frequency == 0.0:
         absent |= {"servo_frequency", "servo_damping_ratio"}
     if loader.regressor is None:
         absent |= {"regressor_force", "regressor_friction"}
-    found = []
-    for stage, names in USUAL.items():
-        wanted = names if stage in stages else ()
-        if stage == "linkage" and drive == "setpoint":
-            wanted = (*wanted, "servo_delay")  # of a bus, or of the servo's own cycle
-        if stage == "linkage" and moved:
-            wanted = ("play",)
-        found += [f"loader.{fields[name]}" for name in wanted if name not in absent]
-    return tuple(found)
+    usual = USUAL_OF_LOADER if "loader" in stages else ()
+    linkage = USUAL_OF_LINKAGE if "linkage" in stages else ()
+    if rig.controls[control].drive == "setpoint":
+        linkage = (*linkage, "servo_delay")  # of a bus, or of the servo's own cycle
+    usual += ("play",) if moved else linkage
+    return tuple(f"loader.{fields[name]}" for name in usual if name not in absent)
 
 
 def freed(rig: Rig, control: ControlName, key: str) -> Effect:
@@ -207,8 +196,8 @@ class Number:
 
     def as_dict(self) -> dict[str, Any]:
         """Return the JSON."""
-        ends = self.interval or (None, None)
-        known = {"filed": self.filed, "found": self.found, "low": ends[0], "high": ends[1]}
+        low, high = self.interval or (None, None)
+        known = {"filed": self.filed, "found": self.found, "low": low, "high": high}
         known |= {} if self.most is None else {"most": self.most}
         return known | ({"at_bound": True} if self.at_bound else {})
 
@@ -336,7 +325,7 @@ def fit_nominal(
         effects = [effect for effect in effects if effect.name != worst.key]
         fits = fitter.fitted(effects)
         numbers |= {one.key: one for one in fits.numbers}
-    held = fits.held
+    held = fits.held.rig
     clock = CLOCK.value_key(CLOCK.free[0])
     together = [one for group in groups.values() for one in alike(group)]
     found = tuple(numbers.values())
@@ -349,8 +338,8 @@ def fit_nominal(
         known,
         found,
         tuple(one for one in together if clock not in one.keys),
-        tuple(_channel(output, rig, held.rig, files[output.record]) for output in used),
-        _doubts_of_servo(known, control, fitted, held.rig, used),
+        tuple(_channel(output, rig, held, files[output.record]) for output in used),
+        _doubts_of_servo(known, control, fitted, held, used),
     )
 
 

@@ -78,7 +78,7 @@ def read_deck(version: int) -> Deck:
         _sized(path, table, _chosen(path, "effects", table, (*EFFECTS, *REVISION_2))),
         _chosen(path, "outsiders", table, OUTSIDERS),
         _rigs(homes, table),
-        _realism(table.get("realism")),
+        Realism(**{name: _tuple(value) for name, value in table.get("realism", {}).items()}),
     )
 
 
@@ -96,18 +96,8 @@ def _sized(path: Path, table: Mapping[str, Any], kinds: tuple[Kind, ...]) -> tup
     return tuple(replace(kind, least=least.get(kind.name, kind.least)) for kind in kinds)
 
 
-def _realism(table: Mapping[str, Any] | None) -> Realism:
-    if table is None:
-        return PLAIN
-    least, most = table["presliding_m"]
-    low, high = table["corner_Hz"]
-    return Realism(
-        presliding_m=(least, most),
-        coloured_noise=table["coloured_noise"],
-        corner_Hz=(low, high),
-        skewed_clock=table["skewed_clock"],
-        wheels=table["wheels"],
-    )
+def _tuple(value: Any) -> Any:
+    return tuple(value) if isinstance(value, list) else value
 
 
 def _chosen(

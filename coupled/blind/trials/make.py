@@ -144,7 +144,7 @@ def _trials(
         name = record_name(i)
         path, note = places.folder / RECORDS / f"{name}.csv", places.parts / f"{name}.json"
         if path.is_file() and note.is_file():
-            yield name, _read_truth(note)
+            yield name, truth_from(read_json(note, UNREADABLE), note)
         else:
             lacking.append((numbers, i, plan))
     for i, truth, text in as_done(workers, make_one, lacking, ahead):
@@ -205,7 +205,8 @@ def _begin(places: Places, asked: Numbers, any_seed: bool) -> Numbers:
     """Check the paths, and return the numbers: those of an unfinished make, or those requested."""
     note = places.parts / NOTE
     if note.is_file():
-        begun = _read_numbers(note)
+        kept = read_as(KeptNumbers, read_json(note, UNREADABLE), note)
+        begun = Numbers(kept.seed, kept.records, kept.rigs, kept.version)
         if not begun.like(asked) or not (any_seed or begun == asked):
             raise InputError(
                 places.folder,
@@ -230,12 +231,3 @@ def _clear(places: Places) -> None:
     for part in sorted(places.parts.iterdir(), key=lambda part: part.name == NOTE):
         part.unlink()
     places.parts.rmdir()
-
-
-def _read_numbers(note: Path) -> Numbers:
-    kept = read_as(KeptNumbers, read_json(note, UNREADABLE), note)
-    return Numbers(kept.seed, kept.records, kept.rigs, kept.version)
-
-
-def _read_truth(note: Path) -> Truth:
-    return truth_from(read_json(note, UNREADABLE), note)

@@ -42,7 +42,7 @@ def alike(rig: Rig, record: Record, effect: str) -> tuple[str, ...]:
     """Return the effects that no record of this rig at these pressures can discriminate from it."""
     if effect not in SAME_LAW:
         return ()
-    outputs = Reader(rig, record, "column", surface_points).outputs()
+    outputs = outputs_of(rig, record, airframe=False)
     ours = [output for output in outputs if output.stage == "schedule"]
     left = {}
     for name in (effect, SAME_LAW[effect]):

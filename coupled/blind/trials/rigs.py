@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from coupled.blind.twin.setting import log_uniform
 from coupled.errors import InputError
 from coupled.rig.parameters import Control
 from coupled.rig.rig import Rig
@@ -49,22 +50,22 @@ def random_rig(rng: np.random.Generator, name: str, own: Mapping[str, Rig]) -> R
 def _moved_column(rng: np.random.Generator, column: Control) -> dict[str, Any]:
     """Return changes to a column, by the keys of a rig file."""
     loader, table = column.loader, column.schedule
-    stiffer = _log(rng, 0.7, 1.5)
+    stiffer = log_uniform(rng, 0.7, 1.5)
     gradients = [_short(g * stiffer * rng.uniform(0.9, 1.1)) for g in table.total_gradient]
     bend = 0.0
     if loader.bend > 0.0:
-        bend = _short(min(_log(rng, 2e-5, 2.5e-4), MOST_BENT / max(gradients)))
+        bend = _short(min(log_uniform(rng, 2e-5, 2.5e-4), MOST_BENT / max(gradients)))
     numbers = {
-        "mass_kg": _short(loader.mass * _log(rng, 0.6, 1.7)),
-        "damping_N_s_per_m": _short(loader.damping * _log(rng, 0.6, 1.7)),
-        "basic_gradient_N_per_m": _short(loader.basic_gradient * _log(rng, 0.7, 1.4)),
+        "mass_kg": _short(loader.mass * log_uniform(rng, 0.6, 1.7)),
+        "damping_N_s_per_m": _short(loader.damping * log_uniform(rng, 0.6, 1.7)),
+        "basic_gradient_N_per_m": _short(loader.basic_gradient * log_uniform(rng, 0.7, 1.4)),
         "breakout_N": _short(loader.breakout * rng.choice([0.0, 0.5, 1.0])),
         "friction_N": _short(loader.friction * rng.choice([0.0, 0.5, 1.0])),
-        "servo_frequency_Hz": _short(_log(rng, 8.0, 30.0)),
+        "servo_frequency_Hz": _short(log_uniform(rng, 8.0, 30.0)),
         "servo_damping_ratio": _short(rng.uniform(0.5, 1.0)),
         "bend_m_per_N": bend,
     }
-    travel = _short(column.travel * _log(rng, 0.8, 1.3))
+    travel = _short(column.travel * log_uniform(rng, 0.8, 1.3))
     length = _short(max(column.length, 2.0 * column.travel) * rng.uniform(0.8, 1.3))
     return {
         f"{COLUMN}.travel_m": travel,
@@ -73,10 +74,6 @@ def _moved_column(rng: np.random.Generator, column: Control) -> dict[str, Any]:
         f"{COLUMN}.schedule.total_gradient_N_per_m": gradients,
         f"{COLUMN}.compensation.bend_m_per_N": bend,
     }
-
-
-def _log(rng: np.random.Generator, low: float, high: float) -> float:
-    return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
 
 def _short(value: float) -> float:

@@ -15,13 +15,7 @@ from coupled.blind.trials.rigs import DRAWN
 from coupled.blind.trials.shares import true_shares
 from coupled.blind.trials.truth import Sizes, TrueEffect, Truth
 from coupled.blind.twin.kinds import Clean, Draw, Kind
-from coupled.blind.twin.setting import (
-    Installed,
-    Setting,
-    draw_setting,
-    fly_clean,
-    with_other,
-)
+from coupled.blind.twin.setting import Installed, Setting, draw_setting, fly_clean, with_other
 from coupled.blind.twin.twin import LostError
 from coupled.record.record import Record
 from coupled.rig.rig import Rig

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
-from coupled.blind.twin.conditions import Conditions
+from coupled.blind.twin.conditions import LATER, Conditions
 from coupled.errors import MISSING, InputError
 from coupled.schema import Lenient, named, read_as
 
@@ -18,11 +18,7 @@ FEWEST_EFFECTS: Mapping[Category, int] = {
     "outsider": 1,
     "lacking": 1,
 }
-# Conditions of a record that its key may omit.
-_CONDITIONS = (
-    *("noise", "bristle_J", "presliding_m", "elastic_share", "corner_Hz"),
-    *("force_skew_s", "motion_skew_s"),
-)
+_CONDITIONS = ("noise", "bristle_J", *LATER)  # that the key of a record may omit
 
 
 @dataclass(frozen=True)
@@ -32,10 +28,6 @@ class TrueEffect:
     name: str
     stage: str
     parameters: Mapping[str, float]
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the effect for the key."""
-        return {"name": self.name, "stage": self.stage, "parameters": dict(self.parameters)}
 
 
 @dataclass(frozen=True)
@@ -51,14 +43,6 @@ class Sizes:
     alone: tuple[float, ...]
     ratio: float
 
-    def as_dict(self) -> dict[str, Any]:
-        """Return the sizes for the key."""
-        return {
-            "clean_gap": dict(self.clean_gap),
-            "alone": list(self.alone),
-            "ratio": self.ratio,
-        }
-
 
 @dataclass(frozen=True)
 class Reading:
@@ -71,10 +55,6 @@ class Reading:
     names: tuple[str, ...]
     stages: tuple[str, ...]
     sure: bool
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the reading for the key."""
-        return {"names": list(self.names), "stages": list(self.stages), "sure": self.sure}
 
 
 @dataclass(frozen=True)
@@ -132,7 +112,7 @@ class Truth:
         table: dict[str, Any] = {
             "class": self.category,
             "rig": self.rig,
-            "effects": [effect.as_dict() for effect in self.effects],
+            "effects": [asdict(effect) for effect in self.effects],
             "stages": list(self.stages),
             "gap": dict(self.gap),
             "missing": list(self.missing),
@@ -141,7 +121,10 @@ class Truth:
         if self.category == "single":
             table["alike"] = list(self.alike)
         if self.readings:
-            table["readings"] = [one.as_dict() for one in self.readings]
+            table["readings"] = [
+                {"names": list(one.names), "stages": list(one.stages), "sure": one.sure}
+                for one in self.readings
+            ]
         if self.budget:
             table["budget"] = {stage: dict(shares) for stage, shares in self.budget.items()}
         if self.also:
@@ -149,7 +132,7 @@ class Truth:
         if self.category == "none":
             table["tolerance"] = dict(self.tolerance)
         if self.sizes is not None:
-            table |= self.sizes.as_dict()
+            table |= asdict(self.sizes) | {"alone": list(self.sizes.alone)}
         if self.conditions is not None:
             table |= self.conditions.as_dict()
         return table

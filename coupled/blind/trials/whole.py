@@ -155,12 +155,7 @@ def _pulses(times: NDArray[np.float64], at: float) -> NDArray[np.float64]:
 
 
 def _truth(
-    category: str,
-    rig: Rig,
-    real: Rig,
-    put: Sequence[_Put],
-    record: Record,
-    conditions: Conditions,
+    category: str, rig: Rig, real: Rig, put: Sequence[_Put], record: Record, conditions: Conditions
 ) -> Truth:
     """Return the truth, with the gap of each effect's stage under the nominal and the real rig."""
     gaps, clean = dict[str, float](), dict[str, float]()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from coupled.blind.twin.twin import Bristles
@@ -29,6 +29,8 @@ class Realism:
 
 
 PLAIN = Realism()
+# Conditions that a record of version 1 does not have.
+LATER = ("presliding_m", "elastic_share", "corner_Hz", "force_skew_s", "motion_skew_s")
 
 
 @dataclass(frozen=True)
@@ -63,19 +65,7 @@ class Conditions:
         return Bristles(self.presliding_m, elastic_share=self.elastic_share)
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the conditions for the key."""
-        table: dict[str, Any] = {
-            "duration_s": self.duration_s,
-            "excitation": list(self.excitation),
-            "level_N": self.level_N,
-            "noise": dict(self.noise),
-        }
-        if self.bristle_J is not None:
-            return table | {"bristle_J": self.bristle_J}
-        return table | {
-            "presliding_m": self.presliding_m,
-            "elastic_share": self.elastic_share,
-            "corner_Hz": dict(self.corner_Hz),
-            "force_skew_s": self.force_skew_s,
-            "motion_skew_s": self.motion_skew_s,
-        }
+        """Return the conditions for the key, those of the record's version."""
+        left_out = {"bristle_J"} if self.bristle_J is None else LATER
+        table = asdict(self) | {"excitation": list(self.excitation)}
+        return {name: value for name, value in table.items() if name not in left_out}

@@ -8,13 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from coupled.blind.twin.kinds import Clean, Draw, Install, Kind
+from coupled.blind.twin.kinds import Clean, Draw, Found, Install, Kind
 from coupled.blind.twin.twin import Twin, first_order, set_friction
 
-Found = dict[str, float]
 
-
-def _scaled(*fields: str) -> Install:
+def scaled(*fields: str) -> Install:
     """Return an installer of a factor exp(±size) on the twin's numbers."""
 
     def install(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
@@ -26,13 +24,34 @@ def _scaled(*fields: str) -> Install:
     return install
 
 
-def _added(field: str, name: str, signed: bool = False) -> Install:
+def added(field: str, name: str, signed: bool = False) -> Install:
     """Return an installer of a number added to the twin's."""
 
     def install(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
         value = size * (draw.side if signed else 1.0)
         twin.set(**{field: twin.get(field) + value})
         return {name: value}
+
+    return install
+
+
+def drifting(field: str, name: str) -> Install:
+    """Return an installer of a number's rate, by its change over the record, with random sign."""
+
+    def install(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
+        rate = draw.side * size / clean.seconds
+        twin.set(**{field: rate})
+        return {name: rate}
+
+    return install
+
+
+def _lagged(field: str) -> Install:
+    """Return an installer of a first-order lag of the size, s, by its gain in a frame."""
+
+    def install(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
+        twin.set(**{field: first_order(size, twin.get("frame_s"))})
+        return {"lag_s": size}
 
     return install
 
@@ -102,11 +121,6 @@ def _stretch(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
     return {"loss_per_Pa": loss}
 
 
-def _surface_lag(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
-    twin.set(lag_gain=first_order(size, twin.get("frame_s")))
-    return {"lag_s": size}
-
-
 def _surface_limit(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
     fastest = clean.speed("column_estimate_m") / clean.rig.controls["column"].travel
     limit = fastest * math.exp(0.3 - size)
@@ -115,11 +129,10 @@ def _surface_limit(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
 
 
 def in_air(field: str) -> Install:
-    """Return an installer of a factor exp(±size) on a property of the airframe."""
+    """Return an installer of a factor exp(±size) on a value of the rig's flight."""
 
     def install(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
-        factor = math.exp(draw.side * size)
-        setattr(twin.air, field, factor)
+        factor = twin.air.factors[field] = math.exp(draw.side * size)
         return {"factor": factor}
 
     return install
@@ -154,52 +167,45 @@ def dryden(
     return np.asarray(blown * rise)
 
 
-def _pressure_lag(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
-    twin.set(pressure_gain=first_order(size, twin.get("frame_s")))
-    return {"lag_s": size}
-
-
 # In trials without effects, deviations within the tolerance are smaller, and no effects.
 BEYOND = 0.03
 
 EFFECTS = (
     Kind("coulomb_friction", "loader", 0.03, 15.0, _coulomb),
     Kind("stribeck_friction", "loader", 0.03, 12.0, _stribeck),
-    Kind("viscous_damping", "loader", BEYOND, 1.0, _scaled("damping")),
-    Kind("inertia", "loader", BEYOND, 1.0, _scaled("mass")),
-    Kind("gradient_error", "loader", 0.001, 0.4, _scaled("basic_gradient")),
+    Kind("viscous_damping", "loader", BEYOND, 1.0, scaled("damping")),
+    Kind("inertia", "loader", BEYOND, 1.0, scaled("mass")),
+    Kind("gradient_error", "loader", 0.001, 0.4, scaled("basic_gradient")),
     Kind("cubic_stiffness", "loader", 0.0005, 1.0, _cubic),
-    Kind("breakout", "loader", 0.03, 15.0, _added("breakout", "breakout_N")),
-    Kind("bob_weight", "loader", 0.1, 40.0, _added("bob_weight", "force_N_per_g"), flown=True),
-    Kind("force_offset", "loader", 0.02, 20.0, _added("offset", "offset_N", signed=True)),
+    Kind("breakout", "loader", 0.03, 15.0, added("breakout", "breakout_N")),
+    Kind("bob_weight", "loader", 0.1, 40.0, added("bob_weight", "force_N_per_g"), flown=True),
+    Kind("force_offset", "loader", 0.02, 20.0, added("offset", "offset_N", signed=True)),
     Kind("digital_multiplier", "loader", 1.0, 1.0, _digital),
-    Kind("transport_delay", "loader", 0.0005, 0.15, _added("delay", "delay_s")),
-    Kind("modifying_lag", "loader", 0.0002, 0.3, _added("modifying_lag", "lag_s")),
-    Kind("deflection_scale", "sensing", 0.0005, 0.15, _scaled("deflection_scale")),
+    Kind("transport_delay", "loader", 0.0005, 0.15, added("delay", "delay_s")),
+    Kind("modifying_lag", "loader", 0.0002, 0.3, added("modifying_lag", "lag_s")),
+    Kind("deflection_scale", "sensing", 0.0005, 0.15, scaled("deflection_scale")),
     Kind("bend", "linkage", 0.005, 1.2, _bend),
     Kind("stiffening_bend", "linkage", 0.05, 3.0, _stiffening),
-    Kind("backlash", "linkage", 2e-5, 4e-3, _added("play", "play_m")),
-    Kind("servo_lag", "linkage", BEYOND, 1.2, _scaled("servo_rate")),
+    Kind("backlash", "linkage", 2e-5, 4e-3, added("play", "play_m")),
+    Kind("servo_lag", "linkage", BEYOND, 1.2, scaled("servo_rate")),
     Kind("servo_rate_limit", "linkage", 0.05, 2.5, _servo_limit),
     Kind("arc_geometry", "linkage", 1.0, 1.0, _arc),
     Kind("cable_stretch", "surface", 0.0005, 0.6, _stretch, flown=True),
-    Kind("surface_lag", "surface", 0.0005, 0.6, _surface_lag, flown=True),
+    Kind("surface_lag", "surface", 0.0005, 0.6, _lagged("lag_gain"), flown=True),
     Kind("surface_rate_limit", "surface", 0.05, 2.5, _surface_limit, flown=True),
+    Kind("surface_freeplay", "surface", 1e-4, 0.06, added("surface_play", "play_norm"), flown=True),
     Kind(
-        "surface_freeplay", "surface", 1e-4, 0.06, _added("surface_play", "play_norm"), flown=True
-    ),
-    Kind(
-        "rigging_offset",
-        "surface",
-        1e-4,
-        0.06,
-        _added("surface_offset", "offset_norm", signed=True),
+        *("rigging_offset", "surface", 1e-4, 0.06),
+        added("surface_offset", "offset_norm", signed=True),
         flown=True,
     ),
-    Kind("elevator_effectiveness", "airframe", 0.005, 0.5, in_air("effectiveness"), flown=True),
-    Kind("pitch_damping", "airframe", 0.01, 1.0, in_air("damping"), flown=True),
+    Kind(
+        *("elevator_effectiveness", "airframe", 0.005, 0.5, in_air("elevator_effectiveness")),
+        flown=True,
+    ),
+    Kind("pitch_damping", "airframe", 0.01, 1.0, in_air("pitch_damping"), flown=True),
     Kind("vertical_gust", "airframe", 0.01, 3.0, _gust, flown=True),
-    Kind("pressure_lag", "schedule", 0.01, 3.0, _pressure_lag),
-    Kind("pressure_scale", "schedule", 0.0005, 0.25, _scaled("pressure_scale")),
-    Kind("schedule_slope", "schedule", 0.0005, 0.4, _scaled("slope")),
+    Kind("pressure_lag", "schedule", 0.01, 3.0, _lagged("pressure_gain")),
+    Kind("pressure_scale", "schedule", 0.0005, 0.25, scaled("pressure_scale")),
+    Kind("schedule_slope", "schedule", 0.0005, 0.4, scaled("slope")),
 )

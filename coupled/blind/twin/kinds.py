@@ -62,7 +62,8 @@ class Clean:
 
 
 # Puts a kind of some size into the twin; returns its parameters by the names of a diagnosis.
-Install = Callable[[Twin, Clean, float, Draw], dict[str, float]]
+Found = dict[str, float]
+Install = Callable[[Twin, Clean, float, Draw], Found]
 
 
 @dataclass(frozen=True)

@@ -5,33 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 
-from coupled.blind.twin.kinds import ALPHA, RATE, SPEED, Clean, Draw, Install, Kind
-from coupled.blind.twin.twin import Twin, set_bristles
-
-Found = dict[str, float]
-
-
-def _plain(field: str, name: str) -> Install:
-    """Return an installer of one number, with random sign."""
-
-    def install(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
-        twin.set(**{field: draw.side * size})
-        return {name: draw.side * size}
-
-    return install
-
-
-def _load_friction(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
-    level = size * clean.peak("column_force_N") + clean.loader.friction
-    twin.set(load_friction=size)
-    set_bristles(twin, level, clean.bristles)
-    return {"share": size}
-
-
-def _cogging(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
-    pitch = clean.peak("column_computed_m") * (0.15 + 0.35 * draw.u[0])
-    twin.set(cog_force=size, cog_pitch=pitch)
-    return {"force_N": size, "pitch_m": pitch}
+from coupled.blind.twin.effects import added, drifting
+from coupled.blind.twin.kinds import ALPHA, RATE, SPEED, Clean, Draw, Found, Install, Kind
+from coupled.blind.twin.revision2 import load_friction, ripple
+from coupled.blind.twin.twin import Twin
 
 
 def _quadratic(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
@@ -49,28 +26,21 @@ def _second_mass(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
     return {"mass_kg": mass, "frequency_Hz": rate / (2.0 * math.pi)}
 
 
-def _gauge_loop(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
-    width = clean.peak("column_force_N") * (0.1 + 0.3 * draw.u[0])
-    twin.set(gauge_loop=size, loop_yield=width)
-    return {"loop_N": size, "yield_N": width}
+def _hysteresis(field: str, name: str) -> Install:
+    """Return an installer of a hysteresis by the force."""
+
+    def install(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
+        width = clean.peak("column_force_N") * (0.1 + 0.3 * draw.u[0])
+        twin.set(**{field: size}, loop_yield=width)
+        return {name: size, "yield_N": width}
+
+    return install
 
 
 def _hum(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
     rate = 1.0 + 5.0 * draw.u[0]
     twin.set(hum_force=size, hum_rate=2.0 * math.pi * rate)
     return {"force_N": size, "frequency_Hz": rate}
-
-
-def _gradient_drift(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
-    rate = draw.side * size / clean.seconds
-    twin.set(gradient_drift=rate)
-    return {"share_per_s": rate}
-
-
-def _bend_loop(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
-    width = clean.peak("column_force_N") * (0.1 + 0.3 * draw.u[0])
-    twin.set(bend_loop=size, loop_yield=width)
-    return {"loop_m": size, "yield_N": width}
 
 
 def _bend_uneven(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
@@ -83,17 +53,6 @@ def _read_square(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
     value = draw.side * size / clean.peak("column_deflection_m") ** 2
     twin.set(read_square=value)
     return {"square_per_m": value}
-
-
-def _read_drift(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
-    value = draw.side * size / clean.seconds
-    twin.set(read_drift=value)
-    return {"drift_m_per_s": value}
-
-
-def _dead_zone(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
-    twin.set(dead_zone=size)
-    return {"half_width_norm": size}
 
 
 def _flutter(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
@@ -113,11 +72,6 @@ def _moment(name: str, law: Callable[[float, Sequence[float], Clean], float]) ->
     return install
 
 
-def _quantised(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
-    twin.set(gradient_step=size)
-    return {"step_N_per_m": size}
-
-
 def _tent(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
     """Make the table wrong around one point, within the q̄ of the record."""
     span = clean.spread("dynamic_pressure_Pa")
@@ -134,43 +88,36 @@ def _pressure_play(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
 
 
 OUTSIDERS = (
-    Kind("load_friction", "loader", 1e-3, 0.3, _load_friction),
-    Kind("cogging", "loader", 0.05, 15.0, _cogging),
+    Kind("load_friction", "loader", 1e-3, 0.3, load_friction("share")),
+    Kind("cogging", "loader", 0.05, 15.0, ripple("force_N", "pitch_m")),
     Kind("quadratic_damping", "loader", 0.1, 40.0, _quadratic),
     Kind("second_mass", "loader", 0.01, 0.6, _second_mass),
-    Kind("gauge_loop", "loader", 0.05, 15.0, _gauge_loop),
+    Kind("gauge_loop", "loader", 0.05, 15.0, _hysteresis("gauge_loop", "loop_N")),
     Kind("periodic_force", "loader", 0.05, 15.0, _hum),
-    Kind("gradient_drift", "loader", 0.005, 0.6, _gradient_drift),
-    Kind("bend_loop", "linkage", 2e-5, 4e-3, _bend_loop),
+    Kind("gradient_drift", "loader", 0.005, 0.6, drifting("gradient_drift", "share_per_s")),
+    Kind("bend_loop", "linkage", 2e-5, 4e-3, _hysteresis("bend_loop", "loop_m")),
     Kind("bend_uneven", "linkage", 2e-5, 8e-3, _bend_uneven),
     Kind("transducer_square", "linkage", 2e-5, 8e-3, _read_square),
-    Kind("transducer_drift", "linkage", 2e-5, 8e-3, _read_drift),
+    Kind("transducer_drift", "linkage", 2e-5, 8e-3, drifting("read_drift", "drift_m_per_s")),
     Kind(
-        "uneven_gain", "surface", 0.001, 0.5, _plain("surface_uneven", "uneven_share"), flown=True
+        *("uneven_gain", "surface", 0.001, 0.5),
+        added("surface_uneven", "uneven_share", signed=True),
+        flown=True,
     ),
-    Kind("dead_zone", "surface", 1e-4, 0.08, _dead_zone, flown=True),
+    Kind("dead_zone", "surface", 1e-4, 0.08, added("dead_zone", "half_width_norm"), flown=True),
     Kind("flutter", "surface", 1e-4, 0.06, _flutter, flown=True),
     Kind(
-        "moment_drift",
-        "airframe",
-        5e-4,
-        0.1,
+        *("moment_drift", "airframe", 5e-4, 0.1),
         _moment("command_norm", lambda time, change, clean: time / clean.seconds),
         flown=True,
     ),
     Kind(
-        "moment_of_alpha",
-        "airframe",
-        0.01,
-        1.0,
+        *("moment_of_alpha", "airframe", 0.01, 1.0),
         _moment("command_per_rad", lambda time, change, clean: change[ALPHA]),
         flown=True,
     ),
     Kind(
-        "moment_of_speed",
-        "airframe",
-        0.002,
-        0.5,
+        *("moment_of_speed", "airframe", 0.002, 0.5),
         _moment(
             "command_per_share",
             lambda time, change, clean: change[SPEED] / clean.mean("true_airspeed_m_per_s"),
@@ -178,16 +125,13 @@ OUTSIDERS = (
         flown=True,
     ),
     Kind(
-        "moment_of_rate_squared",
-        "airframe",
-        0.1,
-        50.0,
+        *("moment_of_rate_squared", "airframe", 0.1, 50.0),
         _moment(
             "command_s2_per_rad2", lambda time, change, clean: abs(change[RATE]) * change[RATE]
         ),
         flown=True,
     ),
-    Kind("gradient_steps", "schedule", 0.5, 400.0, _quantised),
+    Kind("gradient_steps", "schedule", 0.5, 400.0, added("gradient_step", "step_N_per_m")),
     Kind("wrong_knot", "schedule", 5e-4, 0.3, _tent),
     Kind("schedule_hysteresis", "schedule", 0.005, 0.8, _pressure_play),
 )

@@ -10,13 +10,12 @@ import math
 
 import numpy as np
 
-from coupled.blind.twin.effects import in_air
+from coupled.blind.twin.effects import added, drifting, in_air, scaled
 from coupled.blind.twin.kernel import STEPS
-from coupled.blind.twin.kinds import Clean, Draw, Kind
+from coupled.blind.twin.kinds import Clean, Draw, Found, Install, Kind
 from coupled.blind.twin.numbers import KEPT
 from coupled.blind.twin.twin import Bristles, Twin, set_bristles, set_friction
 
-Found = dict[str, float]
 CONTACT_s = 2e-3  # damping over stiffness of a backlash's contact
 OF_SERVO = (
     *("servo_lag", "servo_delay", "servo_tuning", "servo_rate_limit"),
@@ -44,17 +43,27 @@ def _asymmetric(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
     return {"pull_N": pull, "push_N": push}
 
 
-def _load_friction(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
-    twin.set(load_friction=size)
-    level = clean.loader.friction + size * clean.peak("column_force_N")
-    set_bristles(twin, level, clean.bristles)
-    return {"factor": size}
+def load_friction(name: str) -> Install:
+    """Return an installer of friction by load, a share of the force."""
+
+    def install(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
+        twin.set(load_friction=size)
+        level = clean.loader.friction + size * clean.peak("column_force_N")
+        set_bristles(twin, level, clean.bristles)
+        return {name: size}
+
+    return install
 
 
-def _ripple(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
-    period = clean.peak("column_computed_m") * (0.15 + 0.35 * draw.u[0])
-    twin.set(cog_force=size, cog_pitch=period)
-    return {"ripple_N": size, "period_m": period}
+def ripple(force: str, period: str) -> Install:
+    """Return an installer of a force that is periodic in δc; the names are of its parameters."""
+
+    def install(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
+        pitch = clean.peak("column_computed_m") * (0.15 + 0.35 * draw.u[0])
+        twin.set(cog_force=size, cog_pitch=pitch)
+        return {force: size, period: pitch}
+
+    return install
 
 
 def _relaxation(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
@@ -68,11 +77,6 @@ def _force_limit(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
     limit = max(clean.peak("column_modifying_force_N"), 0.1) * math.exp(0.3 - size)
     twin.set(force_limit=limit)
     return {"limit_N": limit}
-
-
-def _crosstalk(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
-    twin.set(crosstalk=draw.side * size)
-    return {"factor": draw.side * size}
 
 
 def _servo_delay(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
@@ -142,28 +146,6 @@ def _soft_backlash(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
     return {"play_m": size, "stiffness_N_per_m": stiffness}
 
 
-def _force_scale(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
-    factor = math.exp(draw.side * size)
-    twin.set(force_scale=factor)
-    return {"factor": factor}
-
-
-def _force_zero(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
-    twin.set(force_zero=draw.side * size)
-    return {"offset_N": draw.side * size}
-
-
-def _deflection_zero(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
-    twin.set(deflection_zero=draw.side * size)
-    return {"offset_m": draw.side * size}
-
-
-def _scale_drift(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
-    rate = draw.side * size / clean.seconds
-    twin.set(scale_drift=rate)
-    return {"per_s": rate}
-
-
 def _force_skew(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
     late = twin.get("force_late") + size
     twin.set(force_late=late)
@@ -191,24 +173,27 @@ def _dropped(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
 REVISION_2 = (
     Kind("presliding_friction", "loader", 0.03, 15.0, _presliding),
     Kind("asymmetric_friction", "loader", 0.03, 15.0, _asymmetric),
-    Kind("load_friction", "loader", 1e-3, 0.3, _load_friction),
-    Kind("friction_ripple", "loader", 0.05, 15.0, _ripple),
+    Kind("load_friction", "loader", 1e-3, 0.3, load_friction("factor")),
+    Kind("friction_ripple", "loader", 0.05, 15.0, ripple("ripple_N", "period_m")),
     Kind("relaxation", "loader", 0.002, 1.0, _relaxation),
     Kind("force_limit", "loader", 0.05, 2.5, _force_limit),
-    Kind("crosstalk", "loader", 5e-4, 0.5, _crosstalk, other=True),
+    Kind("crosstalk", "loader", 5e-4, 0.5, added("crosstalk", "factor", signed=True), other=True),
     Kind("structural_mode", "linkage", 0.03, 0.7, _mode),
     Kind("servo_delay", "linkage", 0.001, 0.3, _servo_delay),
     Kind("bend_hysteresis", "linkage", 0.01, 0.8, _bend_hysteresis),
     Kind("soft_backlash", "linkage", 2e-5, 4e-3, _soft_backlash),
-    Kind("force_scale", "sensing", 0.0005, 0.15, _force_scale),
-    Kind("force_zero", "sensing", 0.02, 20.0, _force_zero),
-    Kind("deflection_zero", "sensing", 2e-5, 8e-3, _deflection_zero),
-    Kind("scale_drift", "sensing", 0.0005, 0.3, _scale_drift),
+    Kind("force_scale", "sensing", 0.0005, 0.15, scaled("force_scale")),
+    Kind("force_zero", "sensing", 0.02, 20.0, added("force_zero", "offset_N", signed=True)),
+    Kind(
+        *("deflection_zero", "sensing", 2e-5, 8e-3),
+        added("deflection_zero", "offset_m", signed=True),
+    ),
+    Kind("scale_drift", "sensing", 0.0005, 0.3, drifting("scale_drift", "per_s")),
     Kind("force_skew", "sensing", 0.001, 0.15, _force_skew),
     Kind("motion_skew", "sensing", 0.001, 0.3, _motion_skew, flown=True, shows="airframe"),
     Kind("mains_hum", "sensing", 1e-5, 3e-3, _hum),
-    Kind("pitch_stiffness", "airframe", 0.005, 0.7, in_air("stiffness"), flown=True),
-    Kind("lift_slope", "airframe", 0.002, 0.4, in_air("lift"), flown=True),
+    Kind("pitch_stiffness", "airframe", 0.005, 0.7, in_air("pitch_stiffness"), flown=True),
+    Kind("lift_slope", "airframe", 0.002, 0.4, in_air("lift_slope"), flown=True),
     Kind("mass", "airframe", 0.001, 0.3, in_air("mass"), flown=True),
     Kind("servo_acceleration_limit", "linkage", 0.05, 2.5, _servo_push),
     Kind("servo_tuning", "linkage", 0.2, 0.7, _servo_tuning),

@@ -157,7 +157,7 @@ class Setting:
 def with_other(rng: np.random.Generator, setting: Setting) -> Setting:
     """Return the setting with a wheel beside the column: forces at its rim, and their noise."""
     shape, _ = pilot_shape(rng, setting.frames, setting.rig.frame_rate)
-    level_N = _log_uniform(rng, 10.0, 60.0)
+    level_N = log_uniform(rng, 10.0, 60.0)
     noise = NOISE[OTHER_FORCE][0] * rng.standard_normal(setting.frames)
     return replace(setting, other=Other(level_N * shape, noise))
 
@@ -168,13 +168,13 @@ def draw_setting(rng: np.random.Generator, rig: Rig, realism: Realism = PLAIN) -
     shape, shapes = pilot_shape(rng, frames, rig.frame_rate)
     pressures = bench_pressure(rng, rig, frames) if rig.flight is None else None
     reach = (0.1, 0.7) if rig.flight is None else (0.03, 0.25)
-    share = float(np.exp(rng.uniform(*np.log(reach))))
+    share = log_uniform(rng, *reach)
     column = rig.controls["column"]
     # A force against the gradient in the middle of the table: the order of magnitude.
     gradient = float(np.median(column.schedule.total_gradient))
     level = share * gradient * column.travel
     names = channels(rig)
-    common = float(np.exp(rng.uniform(np.log(0.5), np.log(2.0))))
+    common = log_uniform(rng, 0.5, 2.0)
     each = np.exp(rng.uniform(-0.35, 0.35, len(names)))
     factors = np.clip(common * (each if rng.uniform() < 0.5 else 1.0), 0.5, 2.0)
     factors = factors * np.ones(len(names))
@@ -187,16 +187,15 @@ def draw_setting(rng: np.random.Generator, rig: Rig, realism: Realism = PLAIN) -
         noise={n: float(s) for n, s in zip(names, sigma, strict=True) if s > 0.0},
     )
     if realism.presliding_m is None:
-        energy_J = _log_uniform(rng, 3e-7, 1.5e-6)
-        conditions = replace(conditions, bristle_J=energy_J)
+        conditions = replace(conditions, bristle_J=log_uniform(rng, 3e-7, 1.5e-6))
         return Setting(rig, shape, frames, pressures, noise, conditions)
     conditions = replace(
         conditions,
-        presliding_m=_log_uniform(rng, *realism.presliding_m),
+        presliding_m=log_uniform(rng, *realism.presliding_m),
         elastic_share=float(rng.uniform(0.05, 0.8)),
     )
     if rng.uniform() < realism.coloured_noise:
-        corners = {n: _log_uniform(rng, *realism.corner_Hz) for n in names if rng.uniform() < 0.5}
+        corners = {n: log_uniform(rng, *realism.corner_Hz) for n in names if rng.uniform() < 0.5}
         for i, name in enumerate(names):
             if name in corners:
                 noise[:, i] = coloured(noise[:, i], corners[name], rig.frame_rate)
@@ -224,7 +223,8 @@ def coloured(white: Floats, corner_Hz: float, frame_rate_Hz: float) -> Floats:
     return np.asarray(lfilter([gain], [1.0, -a], white, zi=start)[0])
 
 
-def _log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
+def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
+    """Return a random number between two positive bounds, uniform in its logarithm."""
     return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
 
@@ -248,14 +248,17 @@ def fly_clean(setting: Setting) -> tuple[Setting, Clean] | None:
 def _logged(record: Record) -> Record:
     """Return the record rounded to the decimals of its logger."""
     data = record.data.copy()
-    for i, name in enumerate(record.channels):
-        data[:, i] = np.round(data[:, i], NOISE[name][1] if name in NOISE else 6)
+    for i, decimals in enumerate(_decimals(record)):
+        data[:, i] = np.round(data[:, i], decimals)
     return Record(record.channels, data)
+
+
+def _decimals(record: Record) -> list[int]:
+    return [NOISE[name][1] if name in NOISE else 6 for name in record.channels]
 
 
 def csv_text(record: Record) -> str:
     """Return a record as a logger's CSV."""
-    digits = [NOISE[name][1] if name in NOISE else 6 for name in record.channels]
-    line = ",".join(f"%.{n}f" for n in digits)
+    line = ",".join(f"%.{n}f" for n in _decimals(record))
     rows = [line % tuple(row) for row in record.data.tolist()]
     return "\n".join([",".join(record.channels), *rows]) + "\n"

@@ -67,16 +67,13 @@ class Bristles:
 class Air:
     """Effects of the air and of the airframe beyond the model.
 
-    `gust` is the air's upward speed, m/s in each frame; `moment` is a command, added at the
-    airframe but not at the surface, as a function of time in s and the change of motion since trim.
-    `late_s` is the delay of the motion's time stamps.
+    `factors` are on values of the rig's flight, by their names. `gust` is the air's upward speed,
+    m/s in each frame; `moment` is a command, added at the airframe but not at the surface, as a
+    function of time in s and the change of motion since trim. `late_s` is the delay of the motion's
+    time stamps.
     """
 
-    effectiveness: float = 1.0
-    damping: float = 1.0
-    stiffness: float = 1.0
-    lift: float = 1.0
-    mass: float = 1.0
+    factors: dict[str, float] = field(default_factory=dict)
     gust: Floats | None = None
     moment: Callable[[float, Sequence[float]], float] | None = None
     late_s: float = 0.0
@@ -235,17 +232,11 @@ def _fly(
     """Fly the twin's aircraft; fill the rig's rows and return the motion, one row a frame."""
     assert rig.flight is not None
     frame_s = 1.0 / rig.frame_rate
-    factors = {
-        "flight.elevator_effectiveness": rig.flight.elevator_effectiveness * twin.air.effectiveness,
-        "flight.pitch_damping": rig.flight.pitch_damping * twin.air.damping,
-        "flight.pitch_stiffness": rig.flight.pitch_stiffness * twin.air.stiffness,
-        "flight.lift_slope": rig.flight.lift_slope * twin.air.lift,
-        "flight.mass": rig.flight.mass * twin.air.mass,
-    }
-    real = rig.changed(factors).flight
-    assert real is not None
+    factors = twin.air.factors.items()
+    real = rig.changed({f"flight.{n}": getattr(rig.flight, n) * factor for n, factor in factors})
+    assert real.flight is not None
     try:
-        craft = airframe(real, frame_s)
+        craft = airframe(real.flight, frame_s)
     except InputError as error:  # no trim with such factors
         raise LostError from error
     moment, gust = twin.air.moment, twin.air.gust

@@ -5,22 +5,8 @@ An effect whose moment needs lateral motion is tried only with records that have
 
 from __future__ import annotations
 
-from coupled.gap.effects.effect import (
-    TERMS,
-    Drawing,
-    Effect,
-    Sampled,
-    added,
-    entry,
-    factor,
-    value,
-)
-from coupled.gap.signals.air import (
-    NEEDS,
-    NEEDS_ACROSS,
-    spread_of_air,
-    spread_of_crossing_air,
-)
+from coupled.gap.effects.effect import TERMS, Drawing, Effect, Sampled, added, entry, factor, value
+from coupled.gap.signals.air import NEEDS, NEEDS_ACROSS, spread_of_air, spread_of_crossing_air
 
 _ROLL, _YAW, _SLIP = "roll_rate_rad_per_s", "yaw_rate_rad_per_s", "sideslip_rad"
 TERM = "term"  # the name of an effect of a named function, in the JSON

@@ -160,13 +160,12 @@ def library_of(rig: Rig, control: ControlName) -> list[Effect]:
 
 def _of_regressor(every: Sequence[Effect], rig: Rig, control: ControlName) -> list[Effect]:
     """Return a library with the effects of the regressor in its unit, or without them."""
-    unit = regressor_unit(rig, control)
-
-    def named(effect: Effect) -> Effect:
-        (p,) = effect.parameters
-        return replace(effect, parameters=(replace(p, name=p.name.replace(UNIT, unit)),))
-
-    of_it = {one.name for one in every if keys_of([one]) & {*BY_REGRESSOR}}
-    if rig.controls[control].loader.regressor is None:
-        return [one for one in every if one.name not in of_it]
-    return [named(one) if one.name in of_it else one for one in every]
+    found = []
+    for effect in every:
+        if not keys_of([effect]) & {*BY_REGRESSOR}:
+            found.append(effect)
+        elif rig.controls[control].loader.regressor is not None:
+            (p,) = effect.parameters
+            name = p.name.replace(UNIT, regressor_unit(rig, control))
+            found.append(replace(effect, parameters=(replace(p, name=name),)))
+    return found

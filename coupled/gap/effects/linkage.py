@@ -13,6 +13,7 @@ from coupled.gap.effects.effect import (
     added,
     entry,
     factor,
+    keys_of,
     limit,
     real_bend,
     value,
@@ -117,7 +118,7 @@ def without_servo(effects: Sequence[Effect]) -> list[Effect]:
     lag = limit("frequency_Hz", SERVO, 0.5, 1000, 10.0, 30.0)
     found = []
     for effect in effects:
-        keys = {p.key for p in effect.parameters}
+        keys = keys_of([effect])
         others = tuple(p for p in effect.parameters if p.key != SERVO and p != DAMPING_RATIO)
         if any(key.startswith("loader.servo_acceleration") for key in keys):
             continue

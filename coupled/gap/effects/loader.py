@@ -96,10 +96,7 @@ FRICTIONS: tuple[Effect, ...] = (
         dry=True,
     ),
     _effect(
-        "regressor_friction",
-        _BY_SPEED,
-        _per_unit("friction_N_per_unit", BY_REGRESSOR[1]),
-        dry=True,
+        "regressor_friction", _BY_SPEED, _per_unit("friction_N_per_unit", BY_REGRESSOR[1]), dry=True
     ),
 )
 
@@ -120,9 +117,7 @@ LOADER: tuple[Effect, ...] = (
         factor("loader.mass_kg", 1.2, tolerance=SETTING),
     ),
     _effect(
-        "viscous_damping",
-        _BY_SPEED,
-        factor("loader.damping_N_s_per_{d}", 1.2, tolerance=SETTING),
+        "viscous_damping", _BY_SPEED, factor("loader.damping_N_s_per_{d}", 1.2, tolerance=SETTING)
     ),
     _effect("gradient_error", _BY_DEFLECTION, factor("loader.basic_gradient_N_per_{d}", 1.05)),
     _effect(
@@ -138,9 +133,7 @@ LOADER: tuple[Effect, ...] = (
     ),
     _effect("force_offset", _BY_DEFLECTION, added("offset_N", "loader.offset_N", -100, 100, 1.0)),
     _effect(
-        "regressor_force",
-        ("regressor", "missing"),
-        _per_unit("force_N_per_unit", BY_REGRESSOR[0]),
+        "regressor_force", ("regressor", "missing"), _per_unit("force_N_per_unit", BY_REGRESSOR[0])
     ),
     _effect(
         "digital_multiplier",

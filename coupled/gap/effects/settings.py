@@ -28,14 +28,7 @@ from coupled.gap.effects.library import BY_NAME, EFFECTS, LAG, STAMP
 from coupled.gap.noise.smooth import rate_of, smoothed
 from coupled.gap.signals.output import Output
 from coupled.gap.signals.reading import Reading
-from coupled.gap.thresholds import (
-    COLUMN_FORCE_N,
-    COLUMN_WAY,
-    MINOR,
-    OTHER_SCALE,
-    CLOCK_s,
-    YIELDS_m,
-)
+from coupled.gap.thresholds import COLUMN_FORCE_N, COLUMN_WAY, MINOR, OTHER_SCALE, CLOCK_s, YIELDS_m
 from coupled.record.channels import ControlName, unit_of
 from coupled.rig.rig import Rig
 
@@ -53,17 +46,17 @@ def settings(rig: Rig, control: ControlName, outputs: Sequence[Output] = ()) -> 
     if not rig.controls:
         return {}
     given, found = rig.controls[control].tolerance, dict[str, Effect]()
+    in_series = any(output.in_series for output in outputs)
     for effect in EFFECTS:
-        if (ends := _ends(effect, rig, control)) is not None:
-            # A tolerance of a sensor in the rig file shows in several outputs.
-            every = effect.stage == "sensing" and effect.free[0].key_on(control) in given
-            found[effect.name] = setting_of(effect, *ends, every_output=every)
-    if not any(output.in_series for output in outputs):
-        return found
-    return {
-        name: replace(one, outputs=("linkage", "loader")) if one.stage == "linkage" else one
-        for name, one in found.items()
-    }
+        ends = _ends(effect, rig, control)
+        if ends is None:
+            continue
+        # A tolerance of a sensor in the rig file shows in several outputs.
+        every = effect.stage == "sensing" and effect.free[0].key_on(control) in given
+        setting = setting_of(effect, *ends, every_output=every)
+        both = in_series and effect.stage == "linkage"
+        found[effect.name] = replace(setting, outputs=("linkage", "loader")) if both else setting
+    return found
 
 
 def lag_within_a_step(rig: Rig) -> Effect:
