@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -315,40 +315,30 @@ def fit_nominal(
             raise InputError(next(iter(records)), key, problem)
     shown_in = {output.stage for output in touched(outputs, effects)}
     fitter = _Fitter(rig, control, outputs, tell)
-    fits = fitter.fitted(effects)
-    numbers = dict(zip(chosen, fits.numbers, strict=True))
-    groups = fits.whole.groups
+    held, whole, fitted = fitter.fitted(effects)
+    numbers = dict(zip(chosen, fitted, strict=True))
     while loose := [numbers[e.name] for e in effects if numbers[e.name].width > 1.0]:
         # The least determined one stays as filed, and the others are fitted again.
         worst = max(loose, key=lambda number: number.width)
         numbers[worst.key] = worst.as_filed
         effects = [effect for effect in effects if effect.name != worst.key]
-        fits = fitter.fitted(effects)
-        numbers |= {one.key: one for one in fits.numbers}
-    held = fits.held.rig
+        held, _, fitted = fitter.fitted(effects)
+        numbers |= {one.key: one for one in fitted}
     clock = CLOCK.value_key(CLOCK.free[0])
-    together = [one for group in groups.values() for one in alike(group)]
+    together = [one for group in whole.groups.values() for one in alike(group)]
     found = tuple(numbers.values())
     used = [output for output in outputs if output.stage in shown_in]
     files = list(records)
     known = _with_fitted(filed, control, found)
-    fitted = {one.key for one in found if one.half is not None}
+    determined = {one.key for one in found if one.half is not None}
     return NominalFit(
         control,
         known,
         found,
         tuple(one for one in together if clock not in one.keys),
-        tuple(_channel(output, rig, held, files[output.record]) for output in used),
-        _doubts_of_servo(known, control, fitted, held, used),
+        tuple(_channel(output, rig, held.rig, files[output.record]) for output in used),
+        _doubts_of_servo(known, control, determined, held.rig, used),
     )
-
-
-class _Fits(NamedTuple):
-    """Fits of the same parameters: to every other stretch, and to all; and the parameters."""
-
-    held: Fit
-    whole: Fit
-    numbers: list[Number]
 
 
 @dataclass(frozen=True)
@@ -360,8 +350,8 @@ class _Fitter:
     outputs: Sequence[Output]
     tell: Tell | None
 
-    def fitted(self, effects: Sequence[Effect]) -> _Fits:
-        """Return the fits, and the parameters as fitted to all records.
+    def fitted(self, effects: Sequence[Effect]) -> tuple[Fit, Fit, list[Number]]:
+        """Return the fits to every other stretch and to all, and the parameters fitted to all.
 
         The interval of a parameter is at least its scatter between the records, each fitted alone.
         """
@@ -376,7 +366,7 @@ class _Fitter:
             self._say(f"fitting to record {i + 1} alone", i + 2, tasks)
             ours = [output for output in self.outputs if output.record == record]
             each.append(self._fit(effects, ours, whole.values))
-        return _Fits(held, whole, [self._number(one, whole, each) for one in effects])
+        return held, whole, [self._number(one, whole, each) for one in effects]
 
     def _say(self, what: str, done: int, tasks: int) -> None:
         if self.tell is not None:
@@ -484,8 +474,8 @@ def _with_fitted(rig: Rig, control: ControlName, numbers: Sequence[Number]) -> R
         if "breakout" in one.key:
             changes[f"controls.{control}.compensation.breakout_N"] = data.assumed_breakout
     halves = {one.key: one.half for one in numbers if one.half is not None and one.half > 0.0}
-    known = {**data.tolerance, **halves}
-    kept = {key: half for key, half in known.items() if not key.startswith("flight.")}
+    known = (data.tolerance | halves).items()
+    kept = {key: half for key, half in known if not key.startswith("flight.")}
     return rig.changed({**changes, f"controls.{control}.tolerance": kept})
 
 

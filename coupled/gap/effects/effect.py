@@ -265,7 +265,7 @@ def value_of(rig: Rig, control: ControlName, key: str) -> Any:
     holder = section_of(rig, control, section)
     if section == "flight" and last.startswith(TERMS):
         return holder.terms.get(last.removeprefix(TERMS), 1.0)
-    return getattr(holder, field_of(rig, control, key)) if last else holder
+    return getattr(holder, field_of(rig, control, key))
 
 
 def section_of(rig: Rig, control: ControlName, section: str) -> Any:

@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,28 +81,24 @@ def ripples(outputs: Sequence[Output], rig: Rig, control: ControlName) -> list[d
         turned = moved([np.exp(2j * np.pi * way / period) for way in ways])
         both = np.column_stack((turned.imag, turned.real))  # by sin and by cos
         waves.append(_wave(both - smooth @ (smooth.T @ both), left, period))
-    taken = np.array([0.0, *(wave.taken for wave in waves), 0.0])
+    taken = np.array([0.0, *(power for _, power in waves), 0.0])
     peaks = np.flatnonzero((taken[1:-1] > taken[:-2]) & (taken[1:-1] >= taken[2:]))
-    best = sorted(peaks.tolist(), key=lambda k: -waves[k].taken)[:TRIES]
-    return [waves[k].values for k in best]
+    best = sorted(peaks.tolist(), key=lambda k: -waves[k][1])[:TRIES]
+    return [waves[k][0] for k in best]
 
 
-class _Wave(NamedTuple):
-    """A ripple's values, and its projection of the residual's power."""
+def _wave(both: Floats, left: Floats, period: float) -> tuple[dict[str, float], float]:
+    """Return the ripple of one period, and its projection of the residual's power.
 
-    values: dict[str, float]
-    taken: float
-
-
-def _wave(both: Floats, left: Floats, period: float) -> _Wave:
-    """Return the ripple of one period, from the responses to its sine and cosine."""
+    `both` are the responses to its sine and cosine.
+    """
     sine, cosine = np.linalg.lstsq(both, left, rcond=None)[0]
     values = {
         "ripple_N": float(np.hypot(sine, cosine)),
         "period_{d}": period,
         "phase_rad": float(np.arctan2(cosine, sine)),
     }
-    return _Wave(values, float(left @ (both @ np.array([sine, cosine]))))
+    return values, float(left @ (both @ np.array([sine, cosine])))
 
 
 def _answer(output: Output, rig: Rig, control: ControlName) -> Complex:
