@@ -90,8 +90,8 @@ def default_keys(
         absent |= {"servo_frequency", "servo_damping_ratio"}
     if loader.regressor is None:
         absent |= {"regressor_force", "regressor_friction"}
-    usual = USUAL_OF_LOADER if "loader" in stages else ()
-    linkage = USUAL_OF_LINKAGE if "linkage" in stages else ()
+    usual: tuple[str, ...] = USUAL_OF_LOADER if "loader" in stages else ()
+    linkage: tuple[str, ...] = USUAL_OF_LINKAGE if "linkage" in stages else ()
     if rig.controls[control].drive == "setpoint":
         linkage = (*linkage, "servo_delay")  # of a bus, or of the servo's own cycle
     usual += ("play",) if moved else linkage
