@@ -12,7 +12,7 @@ import pytest
 from coupled.gap import diagnose as diagnosing
 from coupled.gap.effects.effect import apply
 from coupled.gap.effects.library import BY_NAME, EFFECTS
-from coupled.gap.findings.budget import NOISE, UNEXPLAINED, _Blocks, _shares, shapley_weights
+from coupled.gap.findings.budget import NOISE, UNEXPLAINED, _shares, shapley_weights
 from coupled.gap.findings.credibility import Credibility, Regime, _size
 from coupled.gap.findings.diagnosis import Diagnosis
 from coupled.gap.findings.flown import ChannelAgain, nearer
@@ -102,9 +102,9 @@ def test_two_effects_of_a_stage_share_its_gap_as_they_act_in_it(tmp_path: Path) 
 
 def test_a_floor_that_an_effect_raises_is_of_its_own_power() -> None:
     """Of 10 floors², one is noise; the second that is left is the effect's, the third nobody's."""
-    blocks, noise = _Blocks(np.array([[10.0], [3.0]]), np.ones(1)), np.array([2.0])
+    powers, frames, noise = np.array([[10.0], [3.0]]), np.ones(1), np.array([2.0])
     only = np.zeros(1, dtype=np.intp)
-    named, unexplained, left = _shares(shapley_weights(1), blocks, noise, only)
+    named, unexplained, left = _shares(shapley_weights(1), powers, frames, noise, only)
     assert (named, unexplained, left) == pytest.approx((0.8, 0.1, 0.1))
 
 

@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.gap.chain import BY_NAME as STAGE_OF
-from coupled.gap.effects.effect import Effect, touched
+from coupled.gap.effects.effect import touched
 from coupled.gap.search.case import Case
 from coupled.gap.search.found import Choice, Fit
 from coupled.gap.signals.output import Floats, Output
@@ -45,16 +45,10 @@ def shapley_subsets(players: int) -> tuple[list[int], Floats]:
     """
     if players <= MOST_PLAYERS:
         return list(range(2**players)), shapley_weights(players)
-    whole = 2**players - 1
-    subsets = [
-        0,
-        *(1 << i for i in range(players)),
-        *(whole - (1 << i) for i in range(players)),
-        whole,
-    ]
-    one = np.eye(players)
-    none = np.ones((players, 1))
-    return subsets, 0.5 * np.hstack([none, -one, one, -none])
+    whole, alone = 2**players - 1, [1 << i for i in range(players)]
+    one, none = np.eye(players), np.ones((players, 1))
+    weights = 0.5 * np.hstack([none, -one, one, -none])
+    return [0, *alone, *(whole - i for i in alone), whole], weights
 
 
 def shapley_weights(players: int) -> Floats:
@@ -75,6 +69,7 @@ def shapley_weights(players: int) -> Floats:
 
 
 UNEXPLAINED, NOISE = "unexplained", "noise"
+Floors = Mapping[tuple[int, str], float]  # noise floors by record and channel
 
 
 @dataclass(frozen=True)
@@ -130,7 +125,7 @@ class StageBudget:
 
 
 def stage_budget(
-    stage: str, case: Case, root: Fit, found: Fit, floors: Mapping[tuple[int, str], float]
+    stage: str, case: Case, root: Fit, found: Fit, floors: Floors
 ) -> StageBudget | None:
     """Return a stage's budget; None if neither it nor its neighbours have an output.
 
@@ -140,16 +135,20 @@ def stage_budget(
     if not outputs:
         return None
     players = [e for e in found.effects if touched(outputs, [e])]
-    blocks = _powers(outputs, case, found, players)
+    lengths = [np.bincount(o.stretches) for o in outputs]
+    powers = []
+    for subset in range(2 ** len(players)):
+        kept = [e for i, e in enumerate(players) if subset & 1 << i]
+        rig = case.with_only(found, [*kept, *(e for e in found.effects if e not in players)])
+        lefts = [by_stretch(o.residual(rig) ** 2, o.stretches) for o in outputs]
+        powers.append(np.concatenate(lefts))
     floor = [max(1.0, floors.get((o.record, o.channel), 0.0) / o.floor) ** 2 for o in outputs]
-    noise = np.concatenate(
-        [np.full(len(np.unique(o.stretches)), f) for o, f in zip(outputs, floor, strict=True)]
-    )
+    noise = np.repeat(floor, list(map(len, lengths)))
+    frames = np.concatenate(lengths).astype(float)
+    given = shapley_weights(len(players)), np.array(powers), frames, noise
+    whole = _shares(*given, np.arange(len(noise)))
     draws = np.random.default_rng(7).integers(0, len(noise), (BOOTSTRAPS, len(noise)))
-    weights = shapley_weights(len(players))
-    whole = _shares(weights, blocks, noise, np.arange(len(noise)))
-    drawn = np.array([_shares(weights, blocks, noise, pick) for pick in draws])
-    low, high = np.percentile(drawn, [2.5, 97.5], axis=0)
+    low, high = np.percentile([_shares(*given, pick) for pick in draws], [2.5, 97.5], axis=0)
     names = [*(effect.name for effect in players), UNEXPLAINED, NOISE]
     each = [Share(n, *map(float, v)) for n, *v in zip(names, whole, low, high, strict=True)]
     return StageBudget(stage, tuple(each[:-2]), each[-2], each[-1])
@@ -167,42 +166,23 @@ def _outputs(stage: str, outputs: Sequence[Output], root: Fit, found: Fit) -> li
     return over_limit or sorted(own, key=lambda o: -o.gap(root.rig))[:1]
 
 
-@dataclass(frozen=True)
-class _Blocks:
-    """Sums of squares, floors², by subset of the effects and stretch, and frames by stretch."""
-
-    sums: Floats  # (subsets, stretches)
-    frames: Floats  # (stretches,)
+def by_stretch(signal: Floats, stretches: NDArray[np.intp]) -> Floats:
+    """Return the sum of a signal in each stretch."""
+    return np.array([float(np.sum(signal[stretches == n])) for n in np.unique(stretches)])
 
 
-def _powers(
-    outputs: Sequence[Output], case: Case, found: Fit, players: Sequence[Effect]
-) -> _Blocks:
-    """Return the residual power with each subset of the effects; subset 0 is empty."""
-    frames: list[float] = []
-    sums: list[list[float]] = []
-    for subset in range(2 ** len(players)):
-        kept = [e for i, e in enumerate(players) if subset & 1 << i]
-        rig = case.with_only(found, [*kept, *(e for e in found.effects if e not in players)])
-        row: list[float] = []
-        for output in outputs:
-            number, square = output.stretches, output.residual(rig) ** 2
-            row += [float(np.sum(square[number == b])) for b in np.unique(number)]
-            if subset == 0:
-                frames += [float(np.sum(number == b)) for b in np.unique(number)]
-        sums.append(row)
-    return _Blocks(np.array(sums), np.array(frames))
-
-
-def _shares(weights: Floats, blocks: _Blocks, noise: Floats, pick: NDArray[np.intp]) -> Floats:
+def _shares(
+    weights: Floats, powers: Floats, frames: Floats, noise: Floats, pick: NDArray[np.intp]
+) -> Floats:
     """Return the shares of the effects, of unexplained structure and of noise; sum 1.
 
-    `weights` are those of Shapley. `noise` is the power of noise on each stretch with the effects,
-    floors². `pick` are the stretches that count.
+    `weights` are those of Shapley. `powers` are sums of squares, floors², by subset of the effects
+    and stretch; subset 0 is empty. `frames` are the numbers of frames of the stretches, `noise` the
+    power of noise on each with the effects, floors². `pick` are the stretches that count.
     """
-    frames = blocks.frames[pick]
-    power = blocks.sums[:, pick].sum(axis=1) / frames.sum()
-    floor = min(float(noise[pick] @ frames / frames.sum()), float(power[-1]))
+    counts = frames[pick]
+    power = powers[:, pick].sum(axis=1) / counts.sum()
+    floor = min(float(noise[pick] @ counts / counts.sum()), float(power[-1]))
     named = weights @ power
     if power[0] <= 0.0:  # no residual at all
         return np.array([*(0.0 * named), 0.0, 1.0])
@@ -250,10 +230,7 @@ class Shrink:
         return self.widest.as_dict() | {"channels": [c.as_dict() for c in self.channels]}
 
 
-Floors = Mapping[tuple[int, str], float]
-
-
-def floors_of(case: Case, choice: Choice) -> dict[tuple[int, str], float]:
+def floors_of(case: Case, choice: Choice) -> Floors:
     """Return the noise floors with the improved rig by record and channel."""
     if not choice.fit.effects or case.outputs_with_noise_of is None:
         return {}
@@ -262,15 +239,14 @@ def floors_of(case: Case, choice: Choice) -> dict[tuple[int, str], float]:
 
 def shrink(case: Case, fitted: Fit, floors: Floors) -> Shrink:
     """Return the reduction of the gap on held-out stretches, for a fit to the other stretches."""
-    rig, outputs, effects, found = case.nominal, case.outputs, fitted.effects, fitted.rig
-    pool = touched(outputs, effects) if effects else list(outputs)
-    widest = max(pool, key=lambda output: output.gap(rig))
-
-    def held(output: Output) -> ChannelShrink:
-        floor = max(output.floor, floors.get((output.record, output.channel), 0.0))
-        return channel_shrink(output, rig, found, floor / output.floor, bool(effects))
-
-    return Shrink(held(widest), tuple(held(output) for output in pool))
+    rig, effects = case.nominal, fitted.effects
+    pool = touched(case.outputs, effects) if effects else list(case.outputs)
+    each = []
+    for output in pool:
+        floor = max(output.floor, floors.get((output.record, output.channel), 0.0)) / output.floor
+        each.append(channel_shrink(output, rig, fitted.rig, floor, bool(effects)))
+    gaps = [output.gap(rig) for output in pool]
+    return Shrink(each[gaps.index(max(gaps))], tuple(each))
 
 
 def channel_shrink(
@@ -281,20 +257,19 @@ def channel_shrink(
     `floor` is that of the improved rig, relative to the output's own.
     """
     number = output.stretches[output.rows("held")]
-    held = np.unique(number)
     old, new = output.residual(rig, "held") ** 2, output.residual(found, "held") ** 2
-    sums = np.array([[np.sum(x[number == b]) for x in (old, new, np.ones(len(old)))] for b in held])
+    sums = np.column_stack([by_stretch(x, number) for x in (old, new, np.ones(len(old)))])
     before, after = _rms(sums)
     result = ChannelShrink(
         channel=output.channel,
         before=float(before * output.floor),
         after=float(after * output.floor),
         floor=floor * output.floor,
-        blocks=len(held),
+        blocks=len(sums),
     )
     if not improved or before <= floor:
         return result
-    picks = np.random.default_rng(7).integers(0, len(held), (BOOTSTRAPS, len(held)))
+    picks = np.random.default_rng(7).integers(0, len(sums), (BOOTSTRAPS, len(sums)))
     drawn = np.array([_rms(sums[pick]) for pick in picks])
     closed = (drawn[:, 0] - drawn[:, 1]) / np.maximum(drawn[:, 0] - floor, 1e-9)
     low, high = np.percentile(np.minimum(closed, 1.0), [2.5, 97.5]).tolist()
@@ -303,7 +278,7 @@ def channel_shrink(
         closed=min(1.0, float((before - after) / (before - floor))),
         low=low,
         high=high,
-        reliable=len(held) >= FEW_STRETCHES,
+        reliable=len(sums) >= FEW_STRETCHES,
     )
 
 

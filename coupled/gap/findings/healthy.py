@@ -22,15 +22,15 @@ import numpy as np
 
 from coupled.display import unit_in
 from coupled.gap.effects.effect import Effect
+from coupled.gap.findings.budget import by_stretch
 from coupled.gap.findings.changed import Comparison, compare
 from coupled.gap.findings.result import StageResult, Verdict
 from coupled.gap.noise.smooth import smoothed
 from coupled.gap.search.case import Case
 from coupled.gap.search.found import Fit
 from coupled.gap.search.problem import Problem
-from coupled.gap.signals.output import Floats, HiddenGap, Output, Part
+from coupled.gap.signals.output import HiddenGap, Output, Part
 from coupled.gap.thresholds import ROUGH, SIGMAS
-from coupled.record.channels import ControlName
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
 
@@ -60,7 +60,10 @@ class ModelError:
         noise = float(np.mean([output.floor**2 for output in outputs]))
         each = [float(np.sqrt(np.mean(left**2))) for left in lefts]
         blocks = np.concatenate(
-            [_by_stretch(o, left) for o, left in zip(outputs, lefts, strict=True)]
+            [
+                by_stretch(left**2, output.stretches) / np.bincount(output.stretches)
+                for output, left in zip(outputs, lefts, strict=True)
+            ]
         )
         few = ROUGH / math.sqrt(len(each))
         several = len(each) > 1 and power > 0.0  # a channel computed by the host may have none
@@ -85,10 +88,10 @@ class ModelError:
         error = self.rms * larger
         floor = math.hypot(output.floor, error)
         share = (error / floor) ** 2
-        hidden = floor / max(output.does, 1e-300)
-        hidden_gap = (
-            HiddenGap(hidden, output.channel, output.channel, self.misses) if self.misses else None
-        )
+        hidden_gap = None
+        if self.misses:
+            hidden = floor / max(output.does, 1e-300)
+            hidden_gap = HiddenGap(hidden, output.channel, output.channel, self.misses)
         stretches = max(len(np.unique(output.stretches)), 1)
         scatter = math.hypot(self.by_stretch / math.sqrt(stretches), self.by_record)
         return replace(
@@ -114,7 +117,8 @@ def tolerances(case: Case, found: Fit) -> dict[str, float]:
     those between its halves, and at least a share of the effect, as both halves have one motion.
     """
     numbers = sorted({output.record for output in case.outputs})
-    if len(numbers) > 1:
+    single = len(numbers) == 1
+    if not single:
         parts = [[o for o in case.outputs if o.record == n] for n in numbers]
         fits = [Problem(replace(case, outputs=p)).fit(found.effects, found.values) for p in parts]
     else:
@@ -128,46 +132,27 @@ def tolerances(case: Case, found: Fit) -> dict[str, float]:
                 continue
             filed = float(p.nominal(case.nominal, case.control))
             each = [float(p.entered(filed, one.values[name])) for one in fits]
-            least = ROUGH if len(numbers) == 1 else 0.0
-            least *= abs(float(p.entered(filed, found.values[name])) - filed)
+            off = abs(float(p.entered(filed, found.values[name])) - filed)
+            least = ROUGH * off if single else 0.0
             scatter = max(SIGMAS * float(np.std(each, ddof=1)), least)
             if scatter > 0.0:
                 wide[key] = scatter
     return wide
 
 
-def _by_stretch(output: Output, left: Floats) -> Floats:
-    """Return the mean square of a residual by stretch."""
-    number = output.stretches
-    return np.array([float(np.mean(left[number == n] ** 2)) for n in np.unique(number)])
-
-
 @dataclass(frozen=True)
 class Baseline:
     """The healthy machine: its rig, the effects found in it, and the model errors.
 
-    `records` are those by their files, with the `outputs` of the rig as filed, `nominal`. `had` are
-    the effects found in them, `errors` the model's by channel, `stages` the stage of each channel.
+    `records` are those by their files, `case` has the outputs of the rig as filed. `had` are the
+    effects found in them, `errors` the model's by channel.
     """
 
     records: Mapping[str, Record]
-    outputs: Sequence[Output]
-    control: ControlName
-    nominal: Rig
+    case: Case
     rig: Rig
     had: tuple[Effect, ...]
     errors: Mapping[str, ModelError]
-    stages: Mapping[str, str]
-
-    @property
-    def files(self) -> tuple[str, ...]:
-        """The names of the records' files."""
-        return tuple(self.records)
-
-    @property
-    def effects(self) -> tuple[str, ...]:
-        """The names of the effects found in the healthy records."""
-        return tuple(effect.name for effect in self.had)
 
     @classmethod
     def of(cls, records: Mapping[str, Record], case: Case, found: Fit) -> Baseline:
@@ -179,9 +164,7 @@ class Baseline:
         names = dict.fromkeys(output.channel for output in case.outputs)
         each = {name: [one for one in case.outputs if one.channel == name] for name in names}
         errors = {name: ModelError.of(ours, rig) for name, ours in each.items()}
-        stages = {output.channel: output.stage for output in case.outputs}
-        given = (records, case.outputs, case.control, case.nominal)
-        return cls(*given, rig, found.effects, errors, stages)
+        return cls(records, case, rig, found.effects, errors)
 
     def compared(
         self, records: Sequence[Record], outputs: Sequence[Output], force: bool = True
@@ -190,8 +173,8 @@ class Baseline:
 
         The `force` on the control is tested too.
         """
-        well = (list(self.records.values()), self.outputs)
-        return compare(self.nominal, self.control, well, (records, outputs), force)
+        well = (list(self.records.values()), self.case.outputs)
+        return compare(self.case.nominal, self.case.control, well, (records, outputs), force)
 
     def raised(self, outputs: Sequence[Output]) -> list[Output]:
         """Return outputs with the model error in their noise floors, where it is known."""
@@ -209,22 +192,23 @@ class Baseline:
     def assumed(self) -> frozenset[str]:
         """The stages in which the healthy records widen what counts as noise, or a tolerance."""
         wide = {effect.stage for effect in self.had}
-        return frozenset(wide | {self.stages[name] for name in self.missed})
+        stages = {output.channel: output.stage for output in self.case.outputs}
+        return frozenset(wide | {stages[name] for name in self.missed})
 
     @property
     def words(self) -> str:
         """What the reference is, and where it misses the healthy records."""
-        count = f"{len(self.files)} records" if len(self.files) > 1 else "a record"
-        found = ", ".join(name.replace("_", " ") for name in self.effects)
+        several = len(self.records) > 1
+        count, them = (f"{len(self.records)} records", "them") if several else ("a record", "it")
+        found = ", ".join(effect.name.replace("_", " ") for effect in self.had)
         had = f", with {found}" if found else ""
         said = f"Compared with the healthy machine of {count}{had}."
-        if not (missed := self.missed):
+        if not self.missed:
             return said
         each = ", ".join(
             f"{name} by {one.misses:.3g} times its noise (rms {one.rms:.3g} {unit_in(name)})"
-            for name, one in missed.items()
+            for name, one in self.missed.items()
         )
-        them = "them" if len(self.files) > 1 else "it"
         return (
             f"{said} The rig misses {them} in {each}: smaller changes are not detected there."
             f" Fit the rig to {them} first (coupled fit)."
@@ -236,7 +220,8 @@ class Baseline:
             name: {"rms": one.rms, "by_record": one.by_record, "misses": one.misses}
             for name, one in self.errors.items()
         }
-        return {"records": list(self.files), "effects": list(self.effects), "errors": errors}
+        had = [effect.name for effect in self.had]
+        return {"records": list(self.records), "effects": had, "errors": errors}
 
 
 def beside_healthy(
@@ -251,9 +236,8 @@ def beside_healthy(
     judged by the comparison instead. Where no change of a tenth would have been shown, by the
     comparison or by noise, no verdict is given.
     """
-    if verdict not in ("no_gap", "ambiguous") or any(stage.guilty for stage in stages):
-        return verdict, stages
-    if baseline is None or change is None:
+    decided = verdict not in ("no_gap", "ambiguous") or any(stage.guilty for stage in stages)
+    if decided or baseline is None or change is None:
         return verdict, stages
     if change.changed:
         faulty = set(change.stages[:1])
