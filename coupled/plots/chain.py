@@ -42,7 +42,7 @@ def draw_stages(view: View) -> Figure:
     figure.legend(handles, labels, loc="outside lower center", ncols=4, fontsize=8.5)
     more = len(outputs) - len(shown)
     rest = f" ({more} narrower residuals are not drawn)" if more else ""
-    figure.suptitle(f"Where the {view.diagnosis.subject}'s gap lies{rest}", fontsize=12)
+    figure.suptitle(f"Where the {view.diagnosis.control}'s gap lies{rest}", fontsize=12)
     return figure
 
 

@@ -46,7 +46,7 @@ def draw_ladder(view: View) -> Figure:
     _draw_rungs(rungs, view, gaps)
     _draw_numbers(table, numbers)
     verdict = plain(view.diagnosis.verdict).replace("effect", "explained")
-    figure.suptitle(f"Ladder of the {view.diagnosis.subject}'s gap: {verdict}", fontsize=12)
+    figure.suptitle(f"Ladder of the {view.diagnosis.control}'s gap: {verdict}", fontsize=12)
     return figure
 
 

@@ -43,7 +43,7 @@ def diagnosis_report(
         sections.append(Section(head, tuple(figures)))
     settings = (
         ("rig", whole.nominal.name),
-        ("controls" if whole.controls else "stage", ", ".join(whole.controls) or whole.subject),
+        ("controls" if whole.controls else "stage", ", ".join(whole.controls) or whole.control),
         ("records", f"{len(whole.records)}, {_seconds(whole):.4g} s in all"),
     )
     return Report("Diagnosis", title, _verdict(whole, system), tuple(sections), settings, made)

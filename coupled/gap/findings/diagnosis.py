@@ -36,7 +36,7 @@ from coupled.gap.findings.flown import (
 )
 from coupled.gap.findings.healthy import Baseline
 from coupled.gap.findings.proposal import EffectPower, ProposedTest, in_one_line, next_tests, power
-from coupled.gap.findings.result import FORMAT, EffectResult, Findings, StageResult, Verdict, placed
+from coupled.gap.findings.result import FORMAT, EffectResult, Findings, Verdict, placed
 from coupled.gap.findings.summary import (
     MISFIT,
     NOISE,
@@ -88,28 +88,20 @@ class Diagnosis(Findings, TableResult):
     trim: str = ""
 
     def __repr__(self) -> str:
-        found = "; ".join(
-            ", ".join(
-                [e.label.replace(" ", "_")]
-                + [f"{p.key} = {p.found:.4g} {p.unit}".strip() for p in e.parameters]
-            )
-            for e in self.effects
-        )
-        words = f"{self.verdict}; {found}" if found else self.verdict
-        return f"Diagnosis({self.nominal.name}, {self.subject}: {words})"
+        words: list[str] = [self.verdict]
+        for effect in self.effects:
+            numbers = (f"{p.key} = {p.found:.4g} {p.unit}".strip() for p in effect.parameters)
+            words.append(", ".join((effect.label.replace(" ", "_"), *numbers)))
+        return f"Diagnosis({self.nominal.name}, {self.control}: {'; '.join(words)})"
 
     def to_polars(self) -> pl.DataFrame:
         """Return a row a parameter of the effects found; the units are in the column `unit`."""
         rows = []
         for effect in self.effects:
-            head: dict[str, Any] = {"control": self.control_of(effect), "effect": effect.name}
-            head |= {"stage": effect.stage, "probability": effect.probability}
-            rows += [
-                head
-                | {"key": p.key, "unit": p.unit, "filed": p.filed, "found": p.found}
-                | {"low": p.found_low, "high": p.found_high}
-                for p in effect.parameters
-            ]
+            head = (self.control_of(effect), effect.name, effect.stage, effect.probability)
+            for p in effect.parameters:
+                row = (*head, p.key, p.unit, p.filed, p.found, p.found_low, p.found_high)
+                rows.append(dict(zip(COLUMNS, row, strict=True)))
         return frame_of(rows, COLUMNS)
 
     @property
@@ -149,7 +141,7 @@ class Diagnosis(Findings, TableResult):
     def with_curves(self) -> Rig:
         """The rig with the credible effects and the curves; without curves, the improved rig."""
         rigs = [p.improved if p.curved is None else p.curved.rig for p in self.parts]
-        return self.joined(rigs)
+        return _joined(rigs, self.parts)
 
     @cached_property
     def closed_loop_with_curves(self) -> tuple[ChannelAgain, ...] | None:
@@ -184,21 +176,12 @@ class Diagnosis(Findings, TableResult):
 
         def rig_with(kept: Sequence[int]) -> Rig:
             some = [every[i] for i in kept]
-            return self.joined(
-                [part.rig_with([e for of, e in some if of is part]) for part in self.parts]
-            )
+            rigs = [part.rig_with([e for of, e in some if of is part]) for part in self.parts]
+            return _joined(rigs, self.parts)
 
-        names = [(self.owner(part, effect.stage), effect.name) for part, effect in every]
+        alone = len(self.parts) == 1
+        names = [(None if alone else part.part.owner(e.stage), e.name) for part, e in every]
         return in_flight(names, rig_with, self.controls, self._again)
-
-    def owner(self, part: PartDiagnosis, stage: str) -> ControlName | None:
-        """Return the control by which results of a part's stage are labelled; None for none."""
-        return part.part.owner(stage) if len(self.parts) > 1 else None
-
-    def joined(self, rigs: Sequence[Rig]) -> Rig:
-        """Return the rig that has the controls and the aircraft of the parts' rigs."""
-        (rig,) = rigs
-        return rig
 
     @property
     def improves(self) -> bool:
@@ -208,34 +191,46 @@ class Diagnosis(Findings, TableResult):
     @property
     def improves_with_curves(self) -> bool:
         """Whether the rig with the curves flies no further from the record than the filed rig."""
-        if not self._curved:
-            return self.improves
-        return self.closed_loop_with_curves is None or nearer(self.closed_loop_with_curves)
+        flown = self.closed_loop_with_curves if self._curved else self.closed_loop
+        return flown is None or nearer(flown)
 
-    @property
+    @cached_property
     def next_tests(self) -> tuple[ProposedTest, ...]:
         """The tests that would discriminate the first alternatives, best first; empty if none."""
-        raise NotImplementedError
+        return tuple(test for part in self.parts for test in part.next_tests)
 
     @property
     def next_test(self) -> str:
         """What to record next, in a sentence; empty if no record would help."""
-        raise NotImplementedError
+        parts = sorted(self.parts, key=lambda part: not part.next_tests)
+        return next((part.next_test for part in parts if part.next_test), "")
 
-    @property
+    @cached_property
     def power(self) -> tuple[EffectPower, ...]:
         """The smallest size of each effect that would have been detected."""
-        raise NotImplementedError
+        return tuple(
+            replace(one, control=part.part.owner(one.stage))
+            for part in self.parts
+            for one in part.power
+        )
 
-    @property
+    @cached_property
     def summary(self) -> str:
         """The faults, their sizes, probabilities and shares of the gap, and what to record next."""
-        raise NotImplementedError
+        words = {part.control: part.words() for part in self.parts}
+        clear = [name for name, one in words.items() if one.startswith(no_gap_in([name]))]
+        words |= {name: words[name].removeprefix(no_gap_in([name])).strip() for name in clear}
+        said = [self.trim, *(f"{capital(name)}: {one}" for name, one in words.items() if one)]
+        said += [no_gap_in(clear)] if clear else []
+        said += [in_words(self.in_flight)] if self.in_flight is not None else []
+        said += [self.next_test, *self.left_out]
+        return " ".join(one for one in said if one)
 
     @property
     def beside_healthy(self) -> dict[str, Any]:
-        """The JSON of the comparison with the healthy machine; empty without one."""
-        raise NotImplementedError
+        """The JSON of the comparison with the healthy machine, by part; empty without one."""
+        known = {part.control: part.beside_healthy for part in self.parts}
+        return {name: one for name, one in known.items() if one}
 
     def owned(self, one: EffectResult | EffectInFlight | EffectPower) -> dict[str, Any]:
         """Return the JSON of a result of an effect; with its control, where several are judged."""
@@ -261,21 +256,18 @@ class Diagnosis(Findings, TableResult):
         if self._curved:
             found["curves"] = [one.as_dict() for one in self.curves]
             found["shrink"]["with_curves"] = [one.as_dict() for one in self.shrunk_by_curves]
-        if self.inseparable:
-            found["inseparable"] = [one.as_dict() for one in self.inseparable]
-        if self.filtered:
-            found["filtered"] = dict(self.filtered)
-        if self.left_out:
-            found["left_out"] = list(self.left_out)
-        if self.trim:
-            found["trim"] = self.trim
-        if self.beside_healthy:
-            found["healthy"] = self.beside_healthy
-        if self.closed_loop is not None:
-            found["closed_loop"] = {again.channel: again.as_dict() for again in self.closed_loop}
-        if self.closed_loop_with_curves is not None:
-            flown = self.closed_loop_with_curves
-            found["closed_loop_with_curves"] = {one.channel: one.as_dict() for one in flown}
+        words = {
+            "inseparable": [one.as_dict() for one in self.inseparable],
+            "filtered": dict(self.filtered),
+            "left_out": list(self.left_out),
+            "trim": self.trim,
+            "healthy": self.beside_healthy,
+        }
+        found |= {name: one for name, one in words.items() if one}
+        for name in ("closed_loop", "closed_loop_with_curves"):
+            flown: tuple[ChannelAgain, ...] | None = getattr(self, name)
+            if flown is not None:
+                found[name] = {one.channel: one.as_dict() for one in flown}
         if self.in_flight is not None:
             found["in_flight"] = [self.owned(one) for one in self.in_flight]
         if self.next_tests:
@@ -286,7 +278,7 @@ class Diagnosis(Findings, TableResult):
         return found
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class PartDiagnosis(Diagnosis):
     """The diagnosis of one control, or of the airframe alone (`part`)."""
 
@@ -296,8 +288,6 @@ class PartDiagnosis(Diagnosis):
     baseline: Baseline | None = field(default=None, repr=False, compare=False)
     change: Comparison | None = field(default=None, repr=False, compare=False)
     curved: Curves | None = field(default=None, repr=False, compare=False)
-
-    __repr__ = Diagnosis.__repr__
 
     @property
     def parts(self) -> tuple[PartDiagnosis, ...]:
@@ -389,7 +379,7 @@ def _stands_still(part: Findings) -> bool:
     return any(stage.hidden is not None and stage.hidden.still for stage in part.stages)
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class WholeDiagnosis(Diagnosis):
     """The diagnosis of several controls and the airframe, from those of its parts.
 
@@ -398,13 +388,17 @@ class WholeDiagnosis(Diagnosis):
 
     each: tuple[PartDiagnosis, ...] = field(repr=False)
 
-    __repr__ = Diagnosis.__repr__
-
     @classmethod
     def of(cls, parts: Sequence[PartDiagnosis], records: Mapping[str, Record]) -> WholeDiagnosis:
         """Return the diagnosis of all parts; the airframe is last, if it is a separate part."""
-        stages = [_placed(part, stage) for part in parts for stage in part.stages]
+        stages = [
+            replace(stage, name=placed(stage.name, part.part.owner(stage.name)))
+            for part in parts
+            for stage in part.stages
+        ]
         stages.sort(key=lambda one: (not one.guilty, STAGES.index(one.name.rpartition(".")[2])))
+        pool = [part for part in parts if part.effects] or parts
+        widest = max((part.shrink.widest for part in pool), key=lambda one: one.before / one.floor)
         effects = [
             (gain, replace(effect, control=part.part.owner(effect.stage)))
             for part in parts
@@ -427,7 +421,7 @@ class WholeDiagnosis(Diagnosis):
                 for part in parts
                 for one in part.budget
             ),
-            shrink=_shrink(parts),
+            shrink=Shrink(widest, tuple(one for part in parts for one in part.shrink.channels)),
             nominal=_joined([part.nominal for part in parts], parts),
             improved=_joined([part.improved for part in parts], parts),
             records=records,
@@ -443,56 +437,11 @@ class WholeDiagnosis(Diagnosis):
         """The diagnoses of the controls, and of the airframe."""
         return self.each
 
-    def joined(self, rigs: Sequence[Rig]) -> Rig:
-        """Return the rig that has the controls and the aircraft of the parts' rigs."""
-        return _joined(rigs, self.parts)
-
-    @cached_property
-    def next_tests(self) -> tuple[ProposedTest, ...]:
-        """The tests that would discriminate the first alternatives of each part, best first."""
-        return tuple(test for part in self.parts for test in part.next_tests)
-
-    @property
-    def next_test(self) -> str:
-        """What to record next, in a sentence; a test of alternatives comes first."""
-        parts = sorted(self.parts, key=lambda part: not part.next_tests)
-        return next((part.next_test for part in parts if part.next_test), "")
-
-    @cached_property
-    def power(self) -> tuple[EffectPower, ...]:
-        """The smallest size of each effect that would have been detected."""
-        return tuple(
-            replace(one, control=part.part.owner(one.stage))
-            for part in self.parts
-            for one in part.power
-        )
-
-    @cached_property
-    def summary(self) -> str:
-        """The faults of each part, and what to record next."""
-        words = {part.control: part.words() for part in self.parts}
-        clear = [name for name, one in words.items() if one.startswith(no_gap_in([name]))]
-        words |= {name: words[name].removeprefix(no_gap_in([name])).strip() for name in clear}
-        said = [self.trim, *(f"{capital(name)}: {one}" for name, one in words.items() if one)]
-        said += [no_gap_in(clear)] if clear else []
-        said += [in_words(self.in_flight)] if self.in_flight is not None else []
-        said += [self.next_test, *self.left_out]
-        return " ".join(one for one in said if one)
-
-    @property
-    def beside_healthy(self) -> dict[str, Any]:
-        """The JSON of each part's comparison with the healthy machine; empty without one."""
-        known = {part.control: part.beside_healthy for part in self.parts}
-        return {name: one for name, one in known.items() if one}
-
-
-def _placed(part: PartDiagnosis, stage: StageResult) -> StageResult:
-    """Return a stage of a part with its name among all stages."""
-    return replace(stage, name=placed(stage.name, part.part.owner(stage.name)))
-
 
 def _joined(rigs: Sequence[Rig], parts: Sequence[PartDiagnosis]) -> Rig:
     """Return the rig that has the controls and the aircraft of the parts' rigs."""
+    if len(rigs) == 1:
+        return rigs[0]
     changes: dict[str, Any] = {}
     for rig, part in zip(rigs, parts, strict=True):
         if part.part.own:
@@ -500,10 +449,3 @@ def _joined(rigs: Sequence[Rig], parts: Sequence[PartDiagnosis]) -> Rig:
         if part.part.airframe:
             changes["flight"] = rig.flight
     return rigs[-1].changed(changes)
-
-
-def _shrink(parts: Sequence[PartDiagnosis]) -> Shrink:
-    """Return how far the gaps shrink; the widest is that of the parts with effects, if any."""
-    pool = [part for part in parts if part.effects] or parts
-    widest = max((part.shrink.widest for part in pool), key=lambda one: one.before / one.floor)
-    return Shrink(widest, tuple(one for part in parts for one in part.shrink.channels))

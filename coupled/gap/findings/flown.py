@@ -9,12 +9,13 @@ difference is its Shapley value. The effect with the largest share should be cor
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
 
-from coupled.display import percent
+from coupled.display import percent, split_unit
 from coupled.errors import InputError
 from coupled.flight.gusts import DRAWN, GivenAir
 from coupled.flight.loop import fly
@@ -25,10 +26,10 @@ from coupled.gap.chain import AIRFRAME
 from coupled.gap.effects.library import BY_NAME
 from coupled.gap.findings.budget import shapley_subsets
 from coupled.gap.findings.result import labelled
-from coupled.gap.findings.summary import joined
+from coupled.gap.findings.summary import joined, plain
 from coupled.gap.noise.smooth import smoothed
 from coupled.gap.signals.output import Floats
-from coupled.gap.signals.reading import drifts, softest_gradient
+from coupled.gap.signals.reading import LOAD, PRESSURE, drifts, softest_gradient
 from coupled.gap.stages.airframe import gusts_of, has_gusts
 from coupled.gap.stages.surfaces import surface_channel
 from coupled.gap.thresholds import NEGLIGIBLE, SHORT_FRAMES
@@ -39,7 +40,7 @@ from coupled.rig.rig import Rig
 from coupled.schema import SMALLEST
 
 COMPARED = ("deflection", "computed")  # of the control, and of the motion:
-MOTION = ("pitch_rate_rad_per_s", "load_factor", "pitch_rad")
+MOTION = ("pitch_rate_rad_per_s", LOAD, "pitch_rad")
 LATERAL = ("roll_rate_rad_per_s", "yaw_rate_rad_per_s")
 
 
@@ -59,9 +60,8 @@ class ChannelAgain:
 
     def as_dict(self) -> dict[str, Any]:
         """Return the JSON."""
-        known = {"before_s": self.before_s, "after_s": self.after_s}
-        found = {"before": self.before, "after": self.after}
-        return found | {name: value for name, value in known.items() if value is not None}
+        known = {name: value for name, value in vars(self).items() if name != "channel"}
+        return {name: value for name, value in known.items() if value is not None}
 
 
 def nearer(channels: Sequence[ChannelAgain]) -> bool:
@@ -96,19 +96,17 @@ def fly_force(
     """
     frames = len(next(iter(forces_N.values())))
     times = np.arange(frames) / rig.frame_rate
-    pilots: dict[ControlName, Pilot] = {
-        control: Recorded(times=times.tolist(), forces=_felt(force).tolist())
-        for control, force in forces_N.items()
-    }
+    pilots: dict[ControlName, Pilot] = {}
+    for control, force in forces_N.items():
+        felt = np.where(np.abs(force) < SMALLEST, 0.0, force)  # as a rig file accepts it
+        pilots[control] = Recorded(times=times.tolist(), forces=felt.tolist())
     bench = None
     if rig.flight is None:
         assert pressure_Pa is not None
         points = slice(None, None, SHORT_FRAMES)
         bench = PressureProfile(time_s=times[points], dynamic_pressure_Pa=pressure_Pa[points])
-    again = Manoeuvre(
-        rig, pilots, frames / rig.frame_rate, seed=seed, bench=bench, name="flown-again"
-    )
-    return fly(again, air=air)
+    lasts_s = frames / rig.frame_rate
+    return fly(Manoeuvre(rig, pilots, lasts_s, seed=seed, bench=bench, name="flown-again"), air=air)
 
 
 @dataclass
@@ -127,15 +125,13 @@ class Again:
     @classmethod
     def of(cls, nominal: Rig, controls: Sequence[ControlName], record: Record) -> Again | None:
         """Return the simulation; None if the record lacks a control's force, or a bench's q̄."""
-        pressure = "dynamic_pressure_Pa"
         forces = {name: channel(name, "force") for name in nominal.controls}
         pulled = {n: smoothed(record[force]) for n, force in forces.items() if force in record}
-        lacks_pressure = nominal.flight is None and pressure not in record
+        pressure = smoothed(record[PRESSURE]) if PRESSURE in record else None
+        lacks_pressure = nominal.flight is None and pressure is None
         if not pulled or not pulled.keys() >= {*controls} or lacks_pressure:
             return None
-        return cls(
-            record, nominal, pulled, smoothed(record[pressure]) if pressure in record else None
-        )
+        return cls(record, nominal, pulled, pressure)
 
     def fly(self, rig: Rig) -> Record | None:
         """Return a rig's flight without noise; None if it cannot be flown."""
@@ -144,23 +140,30 @@ class Again:
             if known == quiet:
                 return flown
         air = DRAWN
+        made: Record | None = None
         if rig.flight is not None and has_gusts(rig.flight):
             model = gusts_of(self.nominal, self.record)
             air = DRAWN if model is None else model.air(rig.flight)
-        made: Record | None
-        try:
+        with suppress(InputError):
             made = fly_force(quiet, self.pulled, self.pressure, air)
-        except InputError:
-            made = None
         self._flown.append((quiet, made))
         return made
 
+    def differences(self, rig: Rig, names: Sequence[str]) -> tuple[dict[str, float], float] | None:
+        """Return the RMS differences of a rig's flight from the record, and over which time, s.
+
+        None if it cannot be flown.
+        """
+        flown, record = self.fly(rig), self.record
+        if flown is None:
+            return None
+        rows = min(len(flown), len(record))
+        rms = {n: float(np.sqrt(np.mean((flown[n][:rows] - record[n][:rows]) ** 2))) for n in names}
+        return rms, rows / rig.frame_rate
+
 
 def closed_loop(
-    nominal: Rig,
-    improved: Rig,
-    controls: Sequence[ControlName],
-    again: Again | None,
+    nominal: Rig, improved: Rig, controls: Sequence[ControlName], again: Again | None
 ) -> tuple[ChannelAgain, ...] | None:
     """Return the RMS differences from the record of both rigs, flown with the controls' forces.
 
@@ -178,37 +181,14 @@ def closed_loop(
     motion = [*map(surface_channel, controls), *MOTION, *LATERAL]
     motion = motion if nominal.flight is not None else []
     names = [name for name in (*names, *motion) if name in again.record]
-    before, after = (_differences(again, rig, names) for rig in (nominal, improved))
+    before, after = (again.differences(rig, names) for rig in (nominal, improved))
     if before is None or after is None:
         return None
-    seconds = (before.seconds, after.seconds) if before.seconds != after.seconds else (None, None)
-    return tuple(ChannelAgain(name, before.rms[name], after.rms[name], *seconds) for name in names)
+    (rms, over_s), (rms_after, after_s) = before, after
+    seconds = (over_s, after_s) if over_s != after_s else (None, None)
+    return tuple(ChannelAgain(name, rms[name], rms_after[name], *seconds) for name in names)
 
 
-def _felt(force: Floats) -> Floats:
-    """Return a force with values below the smallest that a rig file accepts set to zero."""
-    return np.where(np.abs(force) < SMALLEST, 0.0, force)
-
-
-@dataclass(frozen=True)
-class _Differences:
-    """RMS differences of a flight from a record by channel, over the seconds that both last."""
-
-    rms: Mapping[str, float]
-    seconds: float
-
-
-def _differences(again: Again, rig: Rig, names: Sequence[str]) -> _Differences | None:
-    """Return the differences of a rig's flight from a record; None if it cannot be flown."""
-    flown, record = again.fly(rig), again.record
-    if flown is None:
-        return None
-    rows = min(len(flown), len(record))
-    rms = {n: float(np.sqrt(np.mean((flown[n][:rows] - record[n][:rows]) ** 2))) for n in names}
-    return _Differences(rms, rows / rig.frame_rate)
-
-
-LOAD = "load_factor"
 Owned = tuple[ControlName | None, str]
 RATES: Mapping[ControlName, tuple[str, ...]] = {
     "column": ("pitch_rate_rad_per_s", LOAD),
@@ -310,17 +290,12 @@ def in_words(effects: Sequence[EffectInFlight]) -> str:
         return "In flight it hardly shows: no channel of the motion changes by 1 %."
     if len(effects) == 1:
         (only,) = effects
-        parts = [f"the {_plain(n)} by {_per_cent(v)}" for n, v in only.of_motion.items()]
+        moved = ((plain(split_unit(name)[0]), by) for name, by in only.of_motion.items())
+        parts = [f"the {name} by {_per_cent(by)}" for name, by in moved]
         return f"In flight it changes {joined(parts)} of their rms."
     parts = [f"{labelled(e.name, e.control)} {_per_cent(e.share)}" for e in effects]
     first = labelled(effects[0].name, effects[0].control)
     return f"Shares of the change in flight: {joined(parts)}. Correct {first} first."
-
-
-def _plain(name: str) -> str:
-    for unit in ("_rad_per_s", "_rad"):
-        name = name.removesuffix(unit)
-    return name.replace("_", " ")
 
 
 def _per_cent(share: float) -> str:

@@ -113,11 +113,8 @@ class StageResult:
         numbers = {"settled": self.settled, "limit": self.limit, "left": self.left}
         found |= {name: number for name, number in numbers.items() if number is not None}
         found["guilty"] = self.guilty
-        if self.where is not None:
-            found["where"] = self.where.as_dict()
-        if self.remains is not None:
-            found["remains"] = self.remains.as_dict()
-        return found
+        described = {"where": self.where, "remains": self.remains}
+        return found | {name: one.as_dict() for name, one in described.items() if one is not None}
 
 
 @dataclass(frozen=True)
@@ -143,11 +140,6 @@ class ParameterEstimate:
     found_high: float | None = None
     host: str = ""
     relative: bool = False
-
-    @property
-    def at_least(self) -> bool:
-        """Whether the estimate is a lower bound, as of backlash that exceeds the motion."""
-        return self.found_low is not None and self.found_high is None
 
     def interval(self, written: Callable[[float], str]) -> str:
         """Return the 95 % interval of the rig's own number in words; none where it is open."""
@@ -205,12 +197,10 @@ class EffectResult:
             "name": TERM if self.of else self.name,
             "stage": self.stage,
             "probability": self.probability,
-            "parameters": {**named, **{p.name: p.as_dict() for p in self.parameters}},
+            "parameters": named | {p.name: p.as_dict() for p in self.parameters},
         }
-        if self.course is not None:
-            found["course"] = self.course.as_dict()
-        known = self.credibility
-        return found | ({} if known is None else {"credibility": known.as_dict()})
+        tests = {"course": self.course, "credibility": self.credibility}
+        return found | {name: one.as_dict() for name, one in tests.items() if one is not None}
 
 
 @dataclass(frozen=True)
@@ -256,11 +246,6 @@ class Findings:
     settings: tuple[SettingResult, ...]
     budget: tuple[StageBudget, ...]
 
-    @property
-    def subject(self) -> str:
-        """The part of the machine that is judged, in words."""
-        return self.control
-
     @public
     def stage(self, name: str) -> StageResult:
         """Return a stage by its name; KeyError if the results do not have it."""
@@ -276,7 +261,7 @@ class Findings:
 
 
 # `refused` and `failed` are verdicts of records that could not be diagnosed.
-AnyVerdict = Literal["no_gap", "effect", "mostly", "ambiguous", "unexplained", "refused", "failed"]
+AnyVerdict = Literal[Verdict, "refused", "failed"]
 
 
 class KeptParameter(Lenient):

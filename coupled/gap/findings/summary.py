@@ -93,13 +93,8 @@ def summary(
     if found.verdict == "no_gap":
         said.append(_not_judged(found))
     else:
-        said += [
-            *map(in_time, found.effects),
-            _since(found),
-            _sure(found),
-            closes(shrink),
-            in_flight,
-        ]
+        said += [*map(in_time, found.effects), _since(found), _sure(found)]
+        said += [closes(shrink), in_flight]
     said += [filtered, next_test]
     return " ".join(sentence for sentence in said if sentence)
 
@@ -113,14 +108,14 @@ def _not_judged(found: Findings) -> str:
 
 def _what(found: Findings, floor: str) -> str:
     if found.verdict == "no_gap":
-        return no_gap_in([found.subject], floor)
+        return no_gap_in([found.control], floor)
     hidden = [stage for stage in found.stages if stage.hidden is not None]
     if hidden and not found.guilty:
         why = "; ".join(f"the {stage.name} is not judged, as {stage.why}" for stage in hidden)
-        return f"Whether the {found.subject} has a gap cannot be decided: {why}."
+        return f"Whether the {found.control} has a gap cannot be decided: {why}."
     if found.verdict == "ambiguous" and not found.guilty:
         return (
-            f"Whether the {found.subject} has a gap cannot be said: the rig does not explain the"
+            f"Whether the {found.control} has a gap cannot be said: the rig does not explain the"
             " healthy records, and their scatter shows no change by a tenth."
         )
     budgets = {one.stage: one for one in found.budget}
@@ -209,15 +204,10 @@ def _set(found: Findings) -> str:
     known = [e for e in found.effects if e.probability >= CERTAIN or e.name in open_ones]
     numbers = [p for effect in known for p in effect.parameters if not _is_none(p)]
     keys = [p.host or f"{dotted(p.key, found.control)} in the rig file" for p in numbers]
-    said = [f"Set {key} to {_found(p)}." for key, p in zip(keys, numbers, strict=True)]
-    switches = [
-        p
-        for one in known
-        if one.name in BY_NAME
-        for p in BY_NAME[one.name].parameters
-        if isinstance(p, Switch)
-    ]
-    for one in switches:
+    found_values = [f"{figure(p.found)} {p.unit}".rstrip() for p in numbers]
+    said = [f"Set {key} to {value}." for key, value in zip(keys, found_values, strict=True)]
+    effects = [BY_NAME[one.name] for one in known if one.name in BY_NAME]
+    for one in (p for effect in effects for p in effect.parameters if isinstance(p, Switch)):
         key = dotted(one.key_on(found.control), found.control)
         said.append(f"Set {key} in the rig file to {json.dumps(one.on)}.")
     return " ".join(said)
@@ -227,10 +217,8 @@ def _settings(found: Findings) -> str:
     """Return the stages whose gap is due to parameters within their tolerance."""
     said = []
     for stage in found.stages:
-        if not stage.within_settings:
-            continue
         off = [one.words for one in found.settings if one.stage == stage.name and one.moved]
-        if off:
+        if off and stage.within_settings:
             said.append(
                 f"The {stage.name} is at {stage.gap:.3g} floors because of {joined(off)},"
                 " each within its tolerance, and is not faulty."
@@ -298,27 +286,22 @@ def in_time(effect: EffectResult) -> str:
 
 def _line(channel: str, line: SeenLine) -> str:
     """Return the amplitude and frequency of a spectral line, and its tone if it is aliased."""
-    unit = unit_in(channel)
-    size = f"{figure(line.amplitude)} {unit}"
-    said = f"A spectral line of {size} is at {line.seen_Hz:.4g} Hz in {channel}"
-    if line.folded:
-        return f"{said}: aliased, from a tone of {line.tone_Hz:.4g} Hz."
-    return f"{said}."
+    size = f"{figure(line.amplitude)} {unit_in(channel)}"
+    tone = f": aliased, from a tone of {line.tone_Hz:.4g} Hz" if line.folded else ""
+    return f"A spectral line of {size} is at {line.seen_Hz:.4g} Hz in {channel}{tone}."
 
 
 def _remains(stage: str, left: Remains) -> str:
     """Return a description of the residual that remains with the effects found."""
-    follows = ""
+    said = f"The residual of the {stage} with these effects is {left.gap:.3g} floors: "
     if left.follows:
         most = left.follows[0]
-        follows = f"{100 * most.share:.0f} % correlates with {_signal(most.signal)}, and "
+        said += f"{100 * most.share:.0f} % correlates with {_signal(most.signal)}, and "
     share = round(100 * left.free_share)
-    of = "the stage's own signals" if left.free_in == "all" else _signal(left.free_in)
-    takes = f"{share} % could be some function of {of}"
     if share < 100.0 * MINOR:
-        takes = "no function of the stage's signals predicts held-out stretches"
-    size = f"{left.gap:.3g} floors"
-    return f"The residual of the {stage} with these effects is {size}: {follows}{takes}."
+        return f"{said}no function of the stage's signals predicts held-out stretches."
+    of = "the stage's own signals" if left.free_in == "all" else _signal(left.free_in)
+    return f"{said}{share} % could be some function of {of}."
 
 
 def _signal(name: str) -> str:
@@ -379,10 +362,6 @@ def _is_none(p: ParameterEstimate) -> bool:
     return p.filed is None and p.found_low is None and p.found_high is None
 
 
-def _found(p: ParameterEstimate) -> str:
-    return f"{figure(p.found)} {p.unit}".rstrip()
-
-
 def figure(value: float) -> str:
     """Return a number of the rig in four figures; small ones as 1.95e-4."""
     if value == 0.0 or abs(value) >= 1e-3:
@@ -401,7 +380,8 @@ def change(p: ParameterEstimate) -> str:
     more = p.found - p.filed
     sign = "+" if more >= 0.0 else ""
     by = f"{100 * (p.value - 1.0):+.3g} %" if p.relative else sign + figure(more)
-    more_does = " or more" if p.at_least else ""
+    at_least = p.found_low is not None and p.found_high is None  # as of play beyond the motion
+    more_does = " or more" if at_least else ""
     return f"{figure(p.filed)} → {figure(p.found)}{unit}{more_does} ({by})"
 
 
@@ -445,16 +425,10 @@ def in_units(parameter: ParameterEstimate, system: System) -> ParameterEstimate:
 
 def size_in(name: str, value: float, system: System) -> str:
     """Return a parameter's size with its name: `play_m 0.001`, in US units `play, in 0.05`."""
-    words, unit = named_in(name, system)
-    return f"{words} {in_figures(name, in_system(unit, system).factor * value)}"
-
-
-def named_in(name: str, system: System) -> tuple[str, str]:
-    """Return a channel's or a parameter's name for people, and its unit in SI."""
     stem, unit = split_unit(name)
-    if system == "si" or not unit:
-        return name, unit
-    return f"{plain(stem)}, {in_system(unit, system).unit}", unit
+    shown = in_system(unit, system)
+    words = name if system == "si" or not unit else f"{plain(stem)}, {shown.unit}"
+    return f"{words} {in_figures(name, shown.factor * value)}"
 
 
 def summary_in(text: str, effects: Sequence[EffectResult], system: System) -> str:
