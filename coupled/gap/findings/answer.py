@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from coupled.gap.findings.result import (
 )
 from coupled.gap.noise.lines import other_side
 from coupled.gap.search.case import Case
-from coupled.gap.search.found import Choice, Found
+from coupled.gap.search.found import Choice, Fit, Found
 from coupled.gap.search.histories import course_in
 from coupled.gap.signals.output import Output
 from coupled.gap.stages.stages import Reader
@@ -61,7 +61,12 @@ def verdict_of(
     open_ones, together = doubted(choice, effects), one_is_certain(choice, effects)
     remains = any(s.name not in blamed or s.unexplained for s in faulty)
     known = {one.stage: one for one in budget}
-    shares = [_held(known.get(s.name), sure if s.unexplained else together) for s in faulty]
+    shares = [
+        sum(known[s.name].of(name) for name in (sure if s.unexplained else together))
+        if s.name in known
+        else 0.0
+        for s in faulty
+    ]
     left, held = bool(open_ones) or remains, min(shares, default=1.0) >= MOST
     if left and not held and (open_ones or _held_together(faulty, shares) < MOST):
         return "unexplained"
@@ -92,11 +97,6 @@ def incredible(choice: Choice, effects: Sequence[EffectResult]) -> frozenset[str
     return frozenset(e.name for e in effects if e.probability * all_of[e.name] < CERTAIN)
 
 
-def _held(budget: StageBudget | None, effects: Collection[str]) -> float:
-    """Return the share of a stage's residual power, without noise, that the effects explain."""
-    return 0.0 if budget is None else sum(budget.of(name) for name in effects)
-
-
 def _held_together(stages: Sequence[StageResult], shares: Sequence[float]) -> float:
     """Return the share that the effects explain of the gaps of all faulty stages together.
 
@@ -119,12 +119,10 @@ def settings_of(
     found = []
     for setting in settings(rig, control, outputs).values():
         for p in setting.free:
-            value = fit.values.get(setting.value_key(p))
-            filed = p.nominal(rig, control) if value is not None else 0.0
-            if value is not None and filed:
-                factor = float(p.entered(filed, value) / filed)
-                name = field_of(rig, control, p.key)
-                found.append(SettingResult(name, setting.stage, factor))
+            key = setting.value_key(p)
+            if key in fit.values and (filed := p.nominal(rig, control)):
+                factor = float(p.entered(filed, fit.values[key]) / filed)
+                found.append(SettingResult(field_of(rig, control, p.key), setting.stage, factor))
     length = next((one.value_key(one.free[0]) for one in contact(rig, control)), "")
     if is_dry(rig, control) and length in fit.values:
         name = f"friction_yields_{unit_of(control)}"
@@ -133,10 +131,7 @@ def settings_of(
 
 
 def effects_of(
-    case: Case,
-    choice: Choice,
-    readers: Sequence[Reader],
-    stages: Sequence[StageResult],
+    case: Case, choice: Choice, readers: Sequence[Reader], stages: Sequence[StageResult]
 ) -> tuple[EffectResult, ...]:
     """Return the effects found, the largest log-likelihood gain first.
 
@@ -152,15 +147,18 @@ def effects_of(
         effect = step.effect
         beside = max(remains.get(stage_of(output), 0.0) for output in effect.shows_in)
         known = credibility(effect, case, choice.fit, records, beside)
-        scatter = _sample_error(effect, readers)
-        numbers = tuple(_estimate(choice, effect, p, case, scatter) for p in effect.free)
+        scatter = 0.0  # relative sampling error of a random quantity, over all records
+        if effect.sampled is not None:
+            errors = [effect.sampled.error(reader.rig, reader.record) for reader in readers]
+            scatter = float(np.sqrt(np.sum(np.square(errors)))) / len(errors)
+        numbers = tuple(_estimate(choice.fit, effect, p, case, scatter) for p in effect.free)
         together = sum(p.has_neutral for p in effect.free) > 1 and step.gain > VERY_STRONG
         sized = together or has_size(effect, case, numbers)
         most = STATED_MOST if sized else (CERTAIN - NEGLIGIBLE)
         probability = min(step.probability * SURE * known.value, most)
         course = course_in(effect, case, choice.fit, records)
-        given = (effect.name, effect.stage, probability, numbers, known, course)
-        return EffectResult(*given, of=effect.of)
+        name, stage = effect.name, effect.stage
+        return EffectResult(name, stage, probability, numbers, known, course, effect.of)
 
     return tuple(result(step) for step in sorted(choice.steps, key=lambda s: -s.gain))
 
@@ -176,9 +174,9 @@ def has_size(effect: Effect, case: Case, numbers: Sequence[ParameterEstimate]) -
 
 
 def _estimate(
-    choice: Choice, effect: Effect, p: Parameter, case: Case, scatter: float
+    fit: Fit, effect: Effect, p: Parameter, case: Case, scatter: float
 ) -> ParameterEstimate:
-    key, fit = effect.value_key(p), choice.fit
+    key = effect.value_key(p)
     value = fit.values[key]
     # The covariance includes noise and misfit, but not that the fit may stop off the optimum.
     low = value - UNDERSTATED * (value - fit.low[key])
@@ -195,7 +193,7 @@ def _estimate(
         low = max(low, min(least, value))
     ends = (low if math.isfinite(low) else None, high if math.isfinite(high) else None)
     filed = float(p.nominal(case.nominal, case.control))
-    bounds = [None if end is None else float(p.entered(filed, end)) for end in ends]
+    found_low, found_high = (None if one is None else float(p.entered(filed, one)) for one in ends)
     held = case.nominal.controls.get(case.control)
     hosted = held is not None and (held.compensation.deflection or held.compensation.gradient)
     return ParameterEstimate(
@@ -207,20 +205,8 @@ def _estimate(
         unit=p.unit(case.nominal, case.control),
         filed=None if p.is_limit and filed == 0.0 else filed,
         found=float(p.entered(filed, value)),
-        found_low=bounds[0],
-        found_high=bounds[1],
+        found_low=found_low,
+        found_high=found_high,
         host=p.host if hosted else "",
         relative=p.mode == "factor",
     )
-
-
-def _sample_error(effect: Effect, readers: Sequence[Reader]) -> float:
-    """Return the relative sampling error of an effect's parameter over all records.
-
-    It is zero unless the parameter describes a random quantity.
-    """
-    if effect.sampled is None:
-        return 0.0
-    error = effect.sampled.error
-    each = [error(reader.rig, reader.record) for reader in readers]
-    return float(np.sqrt(np.sum(np.square(each)))) / len(each)

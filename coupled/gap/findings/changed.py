@@ -136,15 +136,8 @@ class Change:
 
     def as_dict(self) -> dict[str, Any]:
         """Return the JSON."""
-        one = self.interval
-        return {
-            "stage": self.stage,
-            "signal": self.signal,
-            "feature": self.feature,
-            "difference": one.difference,
-            "scatter": one.scatter,
-            "limit": one.limit,
-        }
+        known = vars(self) | vars(self.interval)
+        return {name: one for name, one in known.items() if name not in ("interval", "shown")}
 
 
 @dataclass(frozen=True)
@@ -201,19 +194,6 @@ class Comparison:
 
 
 @dataclass(frozen=True)
-class _Moved:
-    """A motion in d, and its speed in d/s."""
-
-    place: Floats
-    speed: Floats
-
-    @property
-    def numbers(self) -> Floats:
-        """The motion's rms place about its mean, mean place and rms speed."""
-        return np.array([self.place.std(), self.place.mean(), np.sqrt(np.mean(self.speed**2))])
-
-
-@dataclass(frozen=True)
 class _Motions:
     """The motions of healthy records, about which a signal is regressed.
 
@@ -226,11 +206,9 @@ class _Motions:
     sizes: Floats
 
     @classmethod
-    def of(cls, motions: Sequence[_Moved]) -> _Motions:
-        """Return the numbers of some motions."""
-        place, speed = (
-            np.concatenate([getattr(m, n) for m in motions]) for n in ("place", "speed")
-        )
+    def of(cls, motions: Sequence[Floats]) -> _Motions:
+        """Return the numbers of some motions, each place and speed, shape (2, frames)."""
+        place, speed = np.concatenate(motions, axis=1)
         still = SMALL * float(np.sqrt(np.mean(speed**2)))
         moving = np.abs(speed) > still
         usual = float(np.mean(np.abs(speed[moving]))) if moving.any() else still
@@ -239,24 +217,20 @@ class _Motions:
         sizes = np.array([np.sqrt(np.mean(one[moving] ** 2)) for one in each])
         return replace(known, sizes=np.maximum(sizes, 1e-300))
 
-    def regressors(self, moved: _Moved) -> list[Floats]:
+    def regressors(self, moved: Floats) -> list[Floats]:
         """Return speed, place and acceleration of a motion, in units of the healthy ones."""
-        usual, middle = self.middle
-        speed, place = moved.speed - usual * np.sign(moved.speed), moved.place - middle
-        return [
-            one / size
-            for one, size in zip((speed, place, np.gradient(moved.speed)), self.sizes, strict=True)
-        ]
+        (usual, middle), (place, speed) = self.middle, moved
+        each = speed - usual * np.sign(speed), place - middle, np.gradient(speed)
+        return [one / size for one, size in zip(each, self.sizes, strict=True)]
 
 
 @dataclass(frozen=True)
 class _Signal:
-    """A signal of one record, with the motion beside it."""
+    """A signal of one record, with the motion beside it: place, d, and speed, d/s, as rows."""
 
     stage: str
-    name: str
     values: Floats
-    moved: _Moved
+    moved: Floats
     channel_rms: float  # of the channel that it is of
     least: float  # standard deviation of a coefficient from record to record, at the least
 
@@ -280,13 +254,14 @@ def compare(
     pull = channel(control, "force")
     names = [name for name in healthy[0] if all(name in one for one in (*healthy, *tested))]
     features = {name: _features(healthy, tested, name) for name in names}
-    every = [feature for each in features.values() for feature in each]
-    is_first = {
-        name: pull not in names or name == pull or healthy[0][name].stage != "loader"
-        for name in names
+    pairs = {(name, feature) for name, each in features.items() for feature in each}
+    first = {
+        (name, feature)
+        for name, feature in pairs
+        if (pull not in names or name == pull or healthy[0][name].stage != "loader")
+        and feature in FIRST
     }
-    first = sum(is_first[name] and one in FIRST for name in names for one in features[name])
-    chances = {True: 0.5 / max(first, 1), False: 0.5 / max(len(every) - first, 1)}
+    others = pairs - first
     found, shown = [], dict[str, float]()
     for name, each in features.items():
         ours = [one[name] for one in healthy]
@@ -294,7 +269,8 @@ def compare(
         size = float(np.sqrt(np.mean([np.mean(one.values**2) for one in ours])))
         stage, channel_rms = ours[0].stage, float(np.mean([one.channel_rms for one in ours]))
         for feature, (before, after) in each.items():
-            chance = CHANGE_CHANCE * chances[is_first[name] and feature in FIRST]
+            alike = first if (name, feature) in first else others
+            chance = CHANGE_CHANCE * (0.5 / len(alike))
             mean = feature.startswith(LINEAR)
             own = size if mean else 1.0
             more = 2.0 * (excess * own if mean else math.log1p(excess))
@@ -322,16 +298,15 @@ def _signals(
         place = next((smoothed(record[name]) for name in names if name in record), None)
         ours: dict[str, _Signal] = {}
         if place is not None:
-            moved = _Moved(place, rate_of(place, rig.frame_rate))
+            moved = np.array([place, rate_of(place, rig.frame_rate)])
             force = channel(control, "force")
             if with_force and force in record:
-                pull = record[force]
-                rms = float(np.sqrt(np.mean(pull**2)))
-                ours[force] = _Signal("loader", force, pull, moved, rms, ROUNDING_SPAN * rms)
+                rms = float(np.sqrt(np.mean(record[force] ** 2)))
+                ours[force] = _Signal("loader", record[force], moved, rms, ROUNDING_SPAN * rms)
             for one in (o for o in outputs if o.record == number and len(o.measured) == len(place)):
-                name = f"{one.channel} beside its prediction"
                 left, rms = one.residual(rig) * one.floor, float(np.std(one.measured))
-                ours[name] = _Signal(one.stage, name, left, moved, rms, SMALL * one.floor)
+                signal = _Signal(one.stage, left, moved, rms, SMALL * one.floor)
+                ours[f"{one.channel} beside its prediction"] = signal
         found.append(ours)
     return found
 
@@ -342,25 +317,27 @@ def _features(well: Signals, now: Signals, name: str) -> dict[str, tuple[Floats,
     Shape (records, 2): the value, and the variance with which the record determines it.
     """
     about = _Motions.of([one[name].moved for one in well])
-    each = [[_condensed(one[name], about) for one in ours] for ours in (well, now)]
-    kept = [key for key in each[0][0] if all(key in one for ours in each for one in ours)]
-    columns = [{key: np.array([one[key] for one in ours]) for key in kept} for ours in each]
-    return {key: (columns[0][key], columns[1][key]) for key in kept}
+    before, after = ([_condensed(one[name], about) for one in ours] for ours in (well, now))
+    return {
+        key: (np.array([one[key] for one in before]), np.array([one[key] for one in after]))
+        for key in before[0]
+        if all(key in one for one in (*before, *after))
+    }
 
 
 def _condensed(signal: _Signal, about: _Motions) -> dict[str, tuple[float, float]]:
     """Return the features of one signal, and their variances, by its regression."""
     values, found = signal.values, dict[str, tuple[float, float]]()
+    speed = signal.moved[1]
     least = max(len(LEVELS) + len(SLOPES), round(FEW * len(values)))
-    moving = [side * signal.moved.speed > about.still for side, _ in SIDES]
-    sides = [(rows, name) for rows, (_, name) in zip(moving, SIDES, strict=True)]
+    sides = [(side * speed > about.still, name) for side, name in SIDES]
     sides = [(rows, name) for rows, name in sides if rows.sum() >= least]
     if not sides:
         return {}
     every = np.logical_or.reduce([rows for rows, _ in sides])
     steps, levels = [np.ones(len(values))], [f"mean in {sides[0][1]} direction"]
     if len(sides) > 1:
-        steps, levels = [*steps, np.sign(signal.moved.speed)], [MIDDLE, LEVEL]
+        steps, levels = [*steps, np.sign(speed)], [MIDDLE, LEVEL]
     table = np.column_stack([*steps, *about.regressors(signal.moved)])[every]
     known, _, rank, _ = np.linalg.lstsq(table, values[every], rcond=TINY)
     left = np.zeros(len(values))
@@ -378,9 +355,12 @@ def _condensed(signal: _Signal, about: _Motions) -> dict[str, tuple[float, float
     return found
 
 
-def _excess(well: Sequence[_Moved], now: Sequence[_Moved]) -> float:
+def _excess(well: Sequence[Floats], now: Sequence[Floats]) -> float:
     """Return by how much a motion differs, relative, beyond what healthy records' motions do."""
-    before, after = (np.array([one.numbers for one in each]) for each in (well, now))
+    before, after = (
+        np.array([(x.std(), x.mean(), np.sqrt(np.mean(v**2))) for x, v in motions])
+        for motions in (well, now)
+    )
     sizes = before.mean(axis=0)
     sizes[1] = sizes[0]  # a mean place counts by how far the motion goes
     most = 0.0

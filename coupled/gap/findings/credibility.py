@@ -33,6 +33,7 @@ from coupled.gap.noise.smooth import smoothed
 from coupled.gap.search.case import Case
 from coupled.gap.search.found import Fit
 from coupled.gap.signals.output import Floats, Output
+from coupled.gap.signals.reading import PRESSURE
 from coupled.gap.thresholds import DRIFT, DRIFT_CHANCE, FEW, HOST_DRIFT, PARTLY, SMALL
 from coupled.record.record import Record
 
@@ -52,29 +53,30 @@ class Regime:
     high_error: float
     freedom: float
 
+    @property
+    def error(self) -> float:
+        """The standard error of the difference of the sizes."""
+        return math.hypot(self.low_error, self.high_error)
+
     def apart(self, chance: float) -> float:
         """Return the difference of the sizes beyond that which has the probability `chance`.
 
         The difference expected by chance is subtracted in squares.
         """
-        error = math.hypot(self.low_error, self.high_error)
         errors = float(stdtrit(self.freedom, 1.0 - min(chance, 1.0) / 2.0))
-        return math.sqrt(max((self.high - self.low) ** 2 - (errors * error) ** 2, 0.0))
+        return math.sqrt(max((self.high - self.low) ** 2 - (errors * self.error) ** 2, 0.0))
 
     @property
     def p_value(self) -> float:
         """The p-value of the difference if the sizes are equal (two-sided t test)."""
-        error = math.hypot(self.low_error, self.high_error)
-        if error == 0.0:
+        if self.error == 0.0:
             return 1.0
-        away = abs(self.high - self.low) / error
-        return float(2.0 * stdtr(self.freedom, -away))
+        return float(2.0 * stdtr(self.freedom, -abs(self.high - self.low) / self.error))
 
     def as_dict(self) -> dict[str, Any]:
         """Return the JSON."""
-        sizes = {"low": self.low, "high": self.high}
-        errors = {"low_error": self.low_error, "high_error": self.high_error}
-        return {"by": self.by, **sizes, **errors, "p": self.p_value}
+        known = {name: value for name, value in vars(self).items() if name != "freedom"}
+        return known | {"p": self.p_value}
 
 
 @dataclass(frozen=True)
@@ -119,9 +121,8 @@ def _dividing(case: Case, one: Acts) -> dict[str, Floats]:
                 found[f"size of {name}"] = np.abs(signal)
         elif "cubed" not in name:
             found[f"size of {name}"] = np.abs(signal - float(np.median(signal)))
-    pressure = "dynamic_pressure_Pa"
-    if pressure in one.record:
-        found[pressure] = smoothed(one.record[pressure])
+    if PRESSURE in one.record:
+        found[PRESSURE] = smoothed(one.record[PRESSURE])
     return {name: signal for name, signal in found.items() if np.ptp(signal) > 0.0}
 
 
@@ -130,10 +131,11 @@ def _regime(by: str, parts: Sequence[tuple[Acts, Floats]], lasting: float) -> Re
 
     `lasting` is the rms of an error that may be constant in a half, in floors.
     """
-    signal = np.concatenate([signal for _, signal in parts])
-    action = np.concatenate([one.action for one, _ in parts])
-    left = np.concatenate([one.left for one, _ in parts])
-    number = np.concatenate([1000 * one.output.record + one.output.stretches for one, _ in parts])
+    columns = [
+        (signal, one.action, one.left, 1000 * one.output.record + one.output.stretches)
+        for one, signal in parts
+    ]
+    signal, action, left, number = map(np.concatenate, zip(*columns, strict=True))
     power = action**2
     total = float(power.sum())
     if total <= 0.0:
@@ -141,8 +143,9 @@ def _regime(by: str, parts: Sequence[tuple[Acts, Floats]], lasting: float) -> Re
     order = np.argsort(signal, kind="stable")
     reached = np.cumsum(power[order]) / total
     middle = float(signal[order][int(np.searchsorted(reached, 0.5))])
-    low = signal < 0.0 if by.endswith("sign") else signal < middle
-    high = signal > 0.0 if by.endswith("sign") else signal >= middle
+    low, high = signal < middle, signal >= middle
+    if by.endswith("sign"):
+        low, high = signal < 0.0, signal > 0.0
     if min(float(power[low].sum()), float(power[high].sum())) < SMALL * total:
         return None
     sizes = [_size(action[rows], left[rows], number[rows], lasting) for rows in (low, high)]

@@ -16,6 +16,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
+from operator import attrgetter
 
 import numpy as np
 from numpy.typing import NDArray
@@ -94,8 +95,7 @@ def named(name: str, control: ControlName) -> str:
 
 def filed_curve(rig: Rig, control: ControlName, law: Law) -> RigCurve:
     """Return the curve of a law that a rig has; without nodes, it has none."""
-    section, _, name = law.key.partition(".")
-    found: RigCurve = getattr(getattr(rig.controls[control], section), name)
+    found: RigCurve = attrgetter(law.key)(rig.controls[control])
     return found
 
 
@@ -115,7 +115,7 @@ def with_curve(
     its nodes.
     """
     kind = type(filed_curve(rig, control, law))
-    of, value, *_ = file_keys(kind, unit_of(control))
+    of, value, _ = units_of(rig, control, law)
     given = values
     if kind is GradientCurve:  # held at its ends, as the schedule's table
         beyond = 0.01 * float(nodes[-1] - nodes[0])
@@ -144,11 +144,9 @@ def rising(places: Floats) -> Floats:
     can have each, and together they span all functions that are linear between the places.
     """
     above = np.tri(len(places))
-    zero = np.flatnonzero(places == 0.0)
-    for k in range(int(zero[0]) if zero.size else 0):
-        above[:, k] = -1.0 * (np.arange(len(places)) <= k)
-    if zero.size:
-        above[:, zero[0]] = 1.0
+    for zero in np.flatnonzero(places == 0.0):
+        above[:, :zero] = -np.tri(len(places)).T[:, :zero]
+        above[:, zero] = 1.0
     return above
 
 
@@ -164,14 +162,13 @@ def places_of(signal: Floats, law: Law, entries: Sequence[float]) -> Floats:
         width = max(abs(low), abs(high))
         low, high = min(low, -1e-2 * width), max(high, 1e-2 * width)
     near = 0.4 * (high - low) / CURVE_PLACES
-    fixed = [low, high, *(x for x in entries if low < x < high)]
-    fixed += [0.0] if low < 0.0 < high else []
-    found = list(fixed)
+    found = [low, high, *(x for x in entries if low < x < high)]
+    found += [0.0] if low < 0.0 < high else []
     even = np.linspace(low, high, CURVE_PLACES)
     for x in (*even, *np.quantile(signal, np.linspace(0.0, 1.0, CURVE_PLACES))):
         if all(abs(x - other) > near for other in found):
             found.append(float(x))
-    return np.array(sorted(set(found)))
+    return np.unique(found)
 
 
 @dataclass(frozen=True)
@@ -207,17 +204,18 @@ class Sums:
 
     def posterior(self, prior: Floats) -> Posterior:
         """Return values, their covariance, and the log evidence for a prior's precision."""
-        precision = np.einsum("o,oij->ij", self.weights, self.inner) + prior
-        theta = np.linalg.solve(precision, self.weights @ self.along)
+        inner, along = self.weighted()
+        precision = inner + prior
+        theta = np.asarray(np.linalg.solve(precision, along), dtype=np.float64)
+        covariance = np.asarray(np.linalg.inv(precision), dtype=np.float64)
         volume = np.linalg.slogdet(precision)[1] - np.linalg.slogdet(prior)[1]
         rest = -0.5 * float(theta @ prior @ theta) - 0.5 * float(volume) - PRIOR_EFFECT
         rest -= PRIOR_NUMBER * (len(theta) - 1)
-        return Posterior(theta, np.linalg.inv(precision), rest, self.likelihood(theta))
+        return Posterior(theta, covariance, rest, self.likelihood(theta))
 
-    def size(self) -> float:
-        """Return the rms of the values by least squares, without their priors."""
-        inner = np.einsum("o,oij->ij", self.weights, self.inner)
-        return float(np.sqrt(np.mean(_least_squares(inner, self.weights @ self.along) ** 2)))
+    def weighted(self) -> tuple[Floats, Floats]:
+        """Return JᵀJ and Jᵀ·residual of all outputs, by the weights of their frames."""
+        return np.einsum("o,oij->ij", self.weights, self.inner), self.weights @ self.along
 
 
 @dataclass(frozen=True)
@@ -294,16 +292,16 @@ class Pick:
 
     def values(self, basis: Basis) -> Values:
         """Return nodes and values; 0 at 0 of an anchored law."""
-        nodes, free = basis.places[list(self.at)], basis.free[list(self.at)]
-        values = np.zeros(len(nodes))
-        values[free] = self.known.theta
-        return nodes, values
+        return basis.places[list(self.at)], self._at_nodes(basis, self.known.theta)
 
     def errors(self, basis: Basis) -> Floats:
         """Return half of the 95 % interval of each value."""
-        found = np.zeros(len(self.at))
         half = NORMAL_95 * UNDERSTATED * np.sqrt(np.diag(self.known.covariance))
-        found[basis.free[list(self.at)]] = half
+        return self._at_nodes(basis, half)
+
+    def _at_nodes(self, basis: Basis, free: Floats) -> Floats:
+        found = np.zeros(len(self.at))
+        found[basis.free[list(self.at)]] = free
         return found
 
 
@@ -335,7 +333,7 @@ def _smooth(basis: Basis, at: Sequence[int]) -> Floats:
 def with_nodes(basis: Basis, sums: Sums, at: Sequence[int]) -> Pick:
     """Return the curve with nodes at given places, and the smoothness of the largest evidence."""
     own, rough = sums.of(_mix(basis, at)), _smooth(basis, at)
-    size = max(own.size(), 1e-300)
+    size = max(float(np.sqrt(np.mean(_least_squares(*own.weighted()) ** 2))), 1e-300)
     level = np.eye(len(rough)) / (WIDTH * size) ** 2
     each = [own.posterior(level + rough / (kink * size) ** 2) for kink in CURVE_KINKS]
     return Pick(tuple(at), max(each, key=lambda one: one.log))
@@ -390,9 +388,6 @@ def _grown(basis: Basis, sums: Sums, start: Pick, ends: set[int]) -> Pick:
     return best
 
 
-Form = tuple[str, Floats]
-
-
 def closed_form(
     basis: Basis, curve: Pick, entries: Sequence[float], others: Mapping[str, Sequence[Floats]]
 ) -> str:
@@ -422,28 +417,22 @@ def closed_form(
 
 def _log_of(sums: Sums) -> float:
     """Return the log evidence of a few independent sizes, each with a prior of its own width."""
-    inner = np.einsum("o,oij->ij", sums.weights, sums.inner)
+    inner, along = sums.weighted()
     if not np.all(np.diag(inner) > 0.0):
         return -math.inf
     scale = 1.0 / np.sqrt(np.diag(inner))
-    theta = (
-        scale
-        * np.linalg.lstsq(
-            inner * np.outer(scale, scale), scale * (sums.weights @ sums.along), rcond=None
-        )[0]
-    )
+    theta, *_ = np.linalg.lstsq(inner * np.outer(scale, scale), scale * along, rcond=None)
+    theta *= scale
     width = WIDTH * np.maximum(np.abs(theta), scale)
     return sums.posterior(np.diag(1.0 / width**2)).log
 
 
-def _forms(law: Law, x: Floats, entries: Sequence[float]) -> Iterator[Form]:
+def _forms(law: Law, x: Floats, entries: Sequence[float]) -> Iterator[tuple[str, Floats]]:
     """Yield the closed forms of a law, and their values at places, shape (places, 1)."""
     s, size = law.symbol, np.abs(x)
     if law.stage == "schedule":
-        inside = [e for e in entries if x[0] <= e <= x[-1]]
-        for k, at in enumerate(entries):
-            if at in inside:
-                unit = np.eye(len(entries))[k]
+        for at, unit in zip(entries, np.eye(len(entries)), strict=True):
+            if x[0] <= at <= x[-1]:
                 yield f"one entry, at {at:g} Pa", np.interp(x, entries, unit)
         yield f"c·{s}²", x**2
         return

@@ -131,10 +131,7 @@ class Curves:
 def find_curves(
     case: Case, choice: Choice, effects: Sequence[EffectResult], records: Sequence[Record]
 ) -> Curves | None:
-    """Return curves of the stages that the credible of the effects do not explain; None if none.
-
-    `effects` are those found, with their probabilities.
-    """
+    """Return curves of the stages that the credible effects do not explain; None if none."""
     sure = {one.name for one in effects if one.probability >= CERTAIN}
     problem = Problem(case)
     kept = [one for one in choice.fit.effects if one.name in sure]
@@ -147,9 +144,9 @@ def find_curves(
         one = _Fitter(case, problem, base, rig, choice.fit, records).best(open_stages)
         if one is None:
             break
-        found.append(one.curve)
-        rig = one.rig
-        half = with_curve(half, case.control, one.law, *one.fitted) or half
+        curve, rig, law, fitted = one
+        found.append(curve)
+        half = with_curve(half, case.control, law, *fitted) or half
     if not found:
         return None
     closed = tuple(
@@ -167,14 +164,8 @@ def _open_stages(case: Case, choice: Choice, rig: Rig) -> set[str]:
     return {stage_of(at) for at, gap in left.items() if gap > explained_below(root[at], limits[at])}
 
 
-@dataclass(frozen=True)
-class _Found:
-    """A curve: as reported, the rig with it, and the same as fitted to the fitted stretches."""
-
-    curve: Curve
-    rig: Rig
-    law: Law
-    fitted: Values
+# A curve as reported, the rig with it, its law, and its nodes and values by the fitted stretches.
+_Found = tuple[Curve, Rig, Law, Values]
 
 
 @dataclass(frozen=True)
@@ -200,10 +191,11 @@ class _Fitter:
         reading at the grip.
         """
         begun = [one for law in LAWS if (one := self._begun(law, stages)) is not None]
-        most = max((self._gain(*one) for one in begun), default=0.0)
+        above = [pick.known.log - self._likelihood(basis, self.rig) for basis, pick in begun]
+        most = max(above, default=0.0)
         if most <= 0.0:
             return None
-        tied = [one for one in begun if self._gain(*one) > most - RIVAL_GAIN]
+        tied = [one for one, gain in zip(begun, above, strict=True) if gain > most - RIVAL_GAIN]
         flown = [
             (*one, rig) for one in tied if (rig := self._with(one[0].law, one[1].values(one[0])))
         ]
@@ -224,11 +216,7 @@ class _Fitter:
         if rig is None or not self._beats_effects(rig, last):
             return None
         curve = self._stated(whole, last, rig, fitted)
-        return None if curve is None else _Found(curve, rig, basis.law, pick.values(basis))
-
-    def _gain(self, basis: Basis, pick: Pick) -> float:
-        """Return the log evidence of a law's linear model, less that without a curve."""
-        return pick.known.log - self._likelihood(basis, self.rig)
+        return None if curve is None else (curve, rig, basis.law, pick.values(basis))
 
     def _beats_effects(self, rig: Rig, pick: Pick) -> bool:
         """Tell whether a curve has more evidence than the effects found, and than none."""
@@ -313,7 +301,8 @@ class _Fitter:
         start = np.zeros(len(nodes)) if about is None else about[1]
         rig = self.rig if about is None else self._with(law, about)
         assert rig is not None
-        free = np.flatnonzero(~(law.anchored & (places == 0.0)))
+        is_free = ~(law.anchored & (places == 0.0))
+        free = np.flatnonzero(is_free)
         steps = rising(places)
 
         def response(k: int) -> list[Floats] | None:
@@ -335,20 +324,12 @@ class _Fitter:
         columns = [np.zeros((len(output.measured), len(places))) for output in outputs]
         for o, column in enumerate(columns):
             column[:, free] = np.column_stack([one[o] for one in each if one]) @ to_hats
-        responds = [bool(np.any(column)) for column in columns]
-        if not any(responds):
+        if not any(np.any(column) for column in columns):
             return None
-        theta = np.interp(places, nodes, start)
-        theta[np.setdiff1d(np.arange(len(places)), free)] = 0.0
+        theta = np.where(is_free, np.interp(places, nodes, start), 0.0)
         index = [k for k, one in enumerate(self.problem.outputs) if any(one is o for o in outputs)]
-        return Basis(
-            law,
-            places,
-            outputs,
-            columns,
-            [o.residual(rig) + j @ theta for o, j in zip(outputs, columns, strict=True)],
-            self._error.of(index),
-        )
+        wanted = [o.residual(rig) + j @ theta for o, j in zip(outputs, columns, strict=True)]
+        return Basis(law, places, outputs, columns, wanted, self._error.of(index))
 
     def _likelihood(self, basis: Basis, rig: Rig) -> float:
         """Return the log likelihood of a rig in the fitted stretches, by the basis's samples."""

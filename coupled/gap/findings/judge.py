@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 from coupled.gap.chain import BY_NAME as STAGE_OF
-from coupled.gap.chain import CHAIN, Stage, stage_of
+from coupled.gap.chain import STAGES, stage_of
 from coupled.gap.findings.result import StageResult
 from coupled.gap.findings.where import remains, where
 from coupled.gap.search.found import Choice
@@ -47,7 +48,7 @@ class Judge:
         """The nominal rig."""
         return self.readers[0].rig
 
-    @property
+    @cached_property
     def blamed(self) -> set[str]:
         """The stages of the effects found.
 
@@ -67,24 +68,28 @@ class Judge:
         return found
 
     def stages(self) -> tuple[StageResult, ...]:
-        """Return the stages of the rig, in the order of the chain."""
+        """Return the stages of the rig, in the order of the chain.
+
+        Those of a rig without controls are the airframe, and those of the effects found.
+        """
         before = _by_stage(stage_gaps(self.outputs, self.rig))
         root = _by_stage(stage_gaps(self.outputs, self.choice.without_effects.rig))
         left, limits = _by_stage(self.last), _by_stage(stage_limits(self.outputs))
         lacking = self._lacking()
         found = []
-        for stage in CHAIN if self.rig.controls else self._of_aircraft():
-            name = stage.name
+        for name in STAGES:
+            if not self.rig.controls and name != "airframe" and name not in self.blamed:
+                continue
             result: StageResult | None
             if name in before and name not in lacking:
                 unexplained = left[name] > explained_below(root[name], limits[name])
                 faulty = name in self.blamed or unexplained
                 hidden = None if faulty else self._hidden(name)
                 if hidden is not None:
-                    found += [StageResult(name, why=hidden.words, hidden=hidden)]
-                    continue
-                numbers = (before[name], root[name], limits[name], left[name])
-                result = self._with_where(StageResult(name, *numbers, guilty=faulty))
+                    result = StageResult(name, why=hidden.words, hidden=hidden)
+                else:
+                    numbers = (before[name], root[name], limits[name], left[name])
+                    result = self._with_where(StageResult(name, *numbers, guilty=faulty))
             elif name == "sensing":
                 result = self._with_where(self._sensing(before))
             elif name in lacking:
@@ -93,10 +98,6 @@ class Judge:
                 result = self._without_output(name)
             found += [result] if result is not None else []
         return tuple(found)
-
-    def _of_aircraft(self) -> list[Stage]:
-        """Return the stages of a rig without controls: the airframe, and those of effects found."""
-        return [stage for stage in CHAIN if stage.name in {"airframe", *self.blamed}]
 
     def _hidden(self, stage: str) -> HiddenGap | None:
         """Return what hides a gap of the stage; None if one of its floors is low enough."""

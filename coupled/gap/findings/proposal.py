@@ -20,14 +20,7 @@ from typing import Any
 import numpy as np
 
 from coupled.errors import InputError
-from coupled.gap.effects.effect import (
-    Effect,
-    apply,
-    keys_of,
-    possible,
-    touched,
-    value_of,
-)
+from coupled.gap.effects.effect import Effect, apply, keys_of, possible, touched, value_of
 from coupled.gap.effects.library import EFFECTS
 from coupled.gap.effects.settings import contact, settings
 from coupled.gap.findings.flown import fly_force
@@ -77,26 +70,14 @@ def power(
     library: Sequence[Effect] = EFFECTS,
 ) -> tuple[EffectPower, ...]:
     """Return the smallest detectable size of each effect."""
-    lacking = lacking_keys(nominal)
-
-    def judging(effect: Effect) -> list[Output]:
-        return [] if lacking & keys_of([effect]) else touched(outputs, [effect])
-
-    return tuple(_power(nominal, control, judging(one), one) for one in library)
-
-
-def _power(
-    nominal: Rig, control: ControlName, ours: Sequence[Output], effect: Effect
-) -> EffectPower:
-    if not ours:
-        return EffectPower(effect.name, effect.stage, judged=False)
-    values = _least(nominal, control, ours, effect)
-    if values is None:
-        return EffectPower(effect.name, effect.stage)
-    sizes = tuple(
-        (p.named(control), values[effect.value_key(p)]) for p in effect.free if p.role != "shape"
-    )
-    return EffectPower(effect.name, effect.stage, shows=True, parameters=sizes)
+    lacking, found = lacking_keys(nominal), []
+    for effect in library:
+        ours = [] if lacking & keys_of([effect]) else touched(outputs, [effect])
+        values = _least(nominal, control, ours, effect) if ours else None
+        keys = [(p.named(control), effect.value_key(p)) for p in effect.free if p.role != "shape"]
+        sizes = () if values is None else tuple((name, values[key]) for name, key in keys)
+        found.append(EffectPower(effect.name, effect.stage, bool(ours), values is not None, sizes))
+    return tuple(found)
 
 
 def _values(effect: Effect, size: float, nominal: Rig, control: ControlName) -> dict[str, float]:

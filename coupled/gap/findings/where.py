@@ -31,6 +31,7 @@ from coupled.gap.noise.noise import filtered, of_second_order
 from coupled.gap.noise.smooth import rate_of, smoothed
 from coupled.gap.search.course import Bounds
 from coupled.gap.signals.output import Floats, Output
+from coupled.gap.signals.reading import PRESSURE
 from coupled.gap.thresholds import (
     BENDS,
     DOUBLED,
@@ -130,15 +131,6 @@ class Follows(Plain):
 
 
 @dataclass(frozen=True)
-class PressureBand(Plain):
-    """The gap while q̄ is between two pressures, Pa."""
-
-    from_Pa: float
-    to_Pa: float
-    gap: float
-
-
-@dataclass(frozen=True)
 class Where:
     """A description of a stage's gap, from the channel in which it is largest.
 
@@ -153,7 +145,7 @@ class Where:
     loud: float
     begins: Bounds | None = None
     ends: Bounds | None = None
-    by_pressure: tuple[PressureBand, ...] = ()
+    by_pressure: tuple[Mapping[str, float], ...] = ()
     line: SeenLine | None = None
 
     def as_dict(self) -> dict[str, Any]:
@@ -165,7 +157,7 @@ class Where:
             if span is not None:
                 found |= {f"{name}_s": span.value, f"{name}_95_s": [span.low, span.high]}
         if self.by_pressure:
-            found["by_pressure"] = [band.as_dict() for band in self.by_pressure]
+            found["by_pressure"] = list(self.by_pressure)
         if self.line is not None:
             found["line"] = self.line.as_dict()
         return found
@@ -211,18 +203,14 @@ def where(output: Output, rig: Rig, record: Record, control: ControlName) -> Whe
     left, rate_Hz = output.residual(rig), output.frame_rate_Hz
     known = signals(output, left, record, control)
     drives = {name: x for name, x in known.items() if not name.endswith(("sign", "3", "time_s"))}
-    times = in_time(left, drives, rate_Hz)
-    pressure = "dynamic_pressure_Pa"
-    varies = pressure in record and np.ptp(record[pressure]) > 0.0
+    varies = PRESSURE in record and np.ptp(record[PRESSURE]) > 0.0
     return Where(
         channel=output.channel,
-        follows=_follows(output, left, record, control),
+        follows=_follows(left, known, output.floor),
         peak_Hz=_peak(left, rate_Hz),
-        loud=times.loud,
-        begins=times.begins,
-        ends=times.ends,
-        by_pressure=_by(left, smoothed(record[pressure])) if varies else (),
+        by_pressure=_by(left, smoothed(record[PRESSURE])) if varies else (),
         line=widest_line(left, output.floor, rate_Hz),
+        **vars(in_time(left, drives, rate_Hz)),
     )
 
 
@@ -233,7 +221,7 @@ def remains(output: Output, improved: Rig, record: Record, control: ControlName)
     share, signal = free_share(output, left, known, answers)
     return Remains(
         gap=output.gap(improved),
-        follows=_follows(output, left, record, control),
+        follows=_follows(left, known, output.floor),
         peak_Hz=_peak(left, output.frame_rate_Hz),
         free_share=share,
         free_in=signal,
@@ -311,15 +299,15 @@ def signals(
             found[f"{quantity}_sign"] = _sign(smooth)
     common: dict[str, tuple[str, ...]] = {
         "loader": ("load_factor",),
-        "schedule": ("dynamic_pressure_Pa",),
-        "surface": ("dynamic_pressure_Pa",),
+        "schedule": (PRESSURE,),
+        "surface": (PRESSURE,),
         "airframe": AIRFRAME,
     }
     for name in common.get(output.stage, ()):
         if name in record:
             found[name] = smoothed(record[name])
-    if output.stage == "schedule" and "dynamic_pressure_Pa" in found:
-        found["dynamic_pressure_rate_Pa_per_s"] = rate_of(found["dynamic_pressure_Pa"], rate_Hz)
+    if output.stage == "schedule" and PRESSURE in found:
+        found["dynamic_pressure_rate_Pa_per_s"] = rate_of(found[PRESSURE], rate_Hz)
     found["time_s"] = record.time_s
     return found
 
@@ -329,24 +317,22 @@ def _sign(signal: Floats) -> Floats:
     return np.where(np.abs(signal) > MINOR * np.sqrt(np.mean(signal**2)), np.sign(signal), 0.0)
 
 
-def _follows(
-    output: Output, left: Floats, record: Record, control: ControlName
-) -> tuple[Follows, ...]:
+def _follows(left: Floats, known: Mapping[str, Floats], floor: float) -> tuple[Follows, ...]:
     """Return the signals correlated with a residual, largest share first; `constant`: its mean."""
     power = float(np.mean(left**2))
     if power == 0.0:
         return ()
     mean = float(np.mean(left))
-    found = [Follows("constant", mean**2 / power, mean * output.floor)]
+    found = [Follows("constant", mean**2 / power, mean * floor)]
     spread = left - mean
-    for name, signal in signals(output, left, record, control).items():
+    for name, signal in known.items():
         moved = signal - signal.mean()
         size = float(moved @ moved)
         if size <= 0.0:
             continue
         slope = float(spread @ moved) / size
         share = slope**2 * size / (len(left) * power)
-        found.append(Follows(name, share, slope * output.floor))
+        found.append(Follows(name, share, slope * floor))
     found.sort(key=lambda item: -item.share)
     return tuple(item for item in found if item.share >= MINOR)[:TRIES]
 
@@ -362,14 +348,15 @@ def _peak(left: Floats, rate_Hz: float) -> float:
     return float(np.fft.rfftfreq(many, 1.0 / rate_Hz)[1:][np.argmax(power[1:])])
 
 
-def _by(left: Floats, pressure: Floats) -> tuple[PressureBand, ...]:
-    """Return the gap in the lower, middle and upper third of the record's q̄."""
+def _by(left: Floats, pressure: Floats) -> tuple[Mapping[str, float], ...]:
+    """Return the gap in the lower, middle and upper third of the record's q̄, Pa, as JSON."""
     edges = np.linspace(pressure.min(), pressure.max(), 4)
     found = []
     for low, high in pairwise(edges.tolist()):
         rows = (pressure >= low) & (pressure <= high)
         if rows.any():
-            found.append(PressureBand(low, high, float(np.sqrt(np.mean(left[rows] ** 2)))))
+            gap = float(np.sqrt(np.mean(left[rows] ** 2)))
+            found.append({"from_Pa": low, "to_Pa": high, "gap": gap})
     return tuple(found)
 
 
@@ -396,15 +383,16 @@ def in_time(left: Floats, drives: Mapping[str, Floats], rate_Hz: float) -> InTim
     excited = np.array([_rms(x - np.median(x), frames) for x in drives.values()])
     window_s, last = frames / rate_Hz, len(loud)
     share = float(np.mean(loud)) if last else 0.0
-    if not last or not loud.any() or not len(excited):
+    if not loud.any() or not len(excited):
         return InTime(share, None, None)
-    begins = _begins(loud, excited)
-    turned = _begins(loud[::-1], excited[:, ::-1])
-    ends = None
+    first, turned = _begins(loud, excited), _begins(loud[::-1], excited[:, ::-1])
+    begins = ends = None
+    if first is not None:
+        begins = Bounds(*(window_s * k for k in first))
     if turned is not None:
         at_s, high_s, low_s = (window_s * (last - k) for k in turned)
         ends = Bounds(at_s, low_s, high_s)
-    return InTime(share, None if begins is None else Bounds(*(window_s * k for k in begins)), ends)
+    return InTime(share, begins, ends)
 
 
 def _begins(loud: Mask, excited: Floats) -> tuple[int, int, int] | None:
@@ -426,7 +414,5 @@ def _begins(loud: Mask, excited: Floats) -> tuple[int, int, int] | None:
 
 
 def _rms(signal: Floats, frames: int) -> Floats:
-    count = len(signal) // frames
-    return np.asarray(
-        np.sqrt(np.mean(signal[: count * frames].reshape(count, frames) ** 2, axis=1))
-    )
+    windows = signal[: len(signal) // frames * frames].reshape(-1, frames)
+    return np.asarray(np.sqrt(np.mean(windows**2, axis=1)))
