@@ -32,6 +32,7 @@ from coupled.rig.rigfile import read_rig
 from coupled.schema import load_toml
 
 LIST = "records.toml"
+ENDS = (".csv", ".parquet")  # of records' files
 HEAD = ("record", "rig", "verdict", "effects", "parameters", "guilty", "rivals", "closed")
 Progress = Callable[[str, int, int], None]
 _AHEAD = 4  # records that wait for each worker
@@ -74,29 +75,17 @@ def _job(folder: Path, out: Path, name: str, rig: object, control: ControlName |
         raise InputError(folder / LIST, name, problem)
     if not re.match(PLAIN_NAME, rig):
         raise InputError(folder / LIST, name, f"names the rig {rig!r}: give a name, no folder")
-    file = out / f"{name}.json"
+    file, shipped = out / f"{name}.json", shipped_rigs()
     check_target(file, made=out)
-    return Job(name, _record(folder, name), _rig(folder, name, rig), file, control)
-
-
-def _record(folder: Path, name: str) -> Path:
-    places = [
-        folder / sub / f"{name}{end}" for sub in ("", "records") for end in (".csv", ".parquet")
-    ]
-    for place in places:
-        if place.is_file():
-            return place
-    raise InputError(folder / LIST, name, f"there is no {name}.csv or .parquet beside it")
-
-
-def _rig(folder: Path, name: str, rig: str) -> Path:
-    shipped = shipped_rigs()
-    for place in (folder / "rigs" / f"{rig}.toml", folder.parent / "rigs" / f"{rig}.toml"):
-        if place.is_file():
-            return place
-    if rig in shipped:
-        return shipped[rig]
-    raise InputError(folder / LIST, name, f"there is no rig {rig!r}; {nearest(rig, shipped)}")
+    records = (at / f"{name}{end}" for at in (folder, folder / "records") for end in ENDS)
+    record = next((place for place in records if place.is_file()), None)
+    if record is None:
+        raise InputError(folder / LIST, name, f"there is no {name}.csv or .parquet beside it")
+    rigs = (at / "rigs" / f"{rig}.toml" for at in (folder, folder.parent))
+    rig_file = next((place for place in rigs if place.is_file()), shipped.get(rig))
+    if rig_file is None:
+        raise InputError(folder / LIST, name, f"there is no rig {rig!r}; {nearest(rig, shipped)}")
+    return Job(name, record, rig_file, file, control)
 
 
 @dataclass(frozen=True)
@@ -141,11 +130,12 @@ def summary(rows: Sequence[Row]) -> str:
     table = csv.writer(text, lineterminator="\n")
     table.writerow(HEAD)
     for row in rows:
-        cells = [row.record, row.rig, row.verdict, " ".join(row.effects)]
-        named = [(name, value) for name, value in row.parameters if value is not None]
-        cells += [" ".join(f"{name}={value:.5g}" for name, value in named)]
-        cells += [" ".join(row.guilty), " ".join("|".join(group) for group in row.rivals)]
-        table.writerow([*cells, "" if row.closed is None else f"{row.closed:.4f}"])
+        known = [(name, value) for name, value in row.parameters if value is not None]
+        parameters = " ".join(f"{name}={value:.5g}" for name, value in known)
+        rivals = " ".join("|".join(group) for group in row.rivals)
+        closed = "" if row.closed is None else f"{row.closed:.4f}"
+        cells = (row.record, row.rig, row.verdict, " ".join(row.effects), parameters)
+        table.writerow((*cells, " ".join(row.guilty), rivals, closed))
     return text.getvalue()
 
 
@@ -194,24 +184,19 @@ def answer(
     """
     try:
         document = diagnose(rig, {name: record}, control, workers=1).as_dict()
-    except InputError as error:
-        document = _nothing("refused", f"{error.key}: {error.problem}".lstrip(": "))
     except Exception as error:
         # A defect of the diagnosis is said in this record's file, and the others go on.
-        document = _nothing("failed", f"{type(error).__name__}: {error}")
+        document = _nothing(error)
     return number, version_hash(), document
 
 
-def _nothing(verdict: str, why: str) -> dict[str, Any]:
-    """Return the JSON of a record that could not be diagnosed."""
-    nothing: dict[str, Any] = {"stages": {}, "effects": [], "rivals": [], "shrink": {}}
-    return {"format": FORMAT, "verdict": verdict, "why": why} | nothing
-
-
-def _keep(job: Job, made: Mapping[str, str], answered: Mapping[str, Any]) -> Row:
-    document = {"record": job.name} | dict(answered) | {"made": dict(made)}
-    write_text(job.out, json_text(document, indent=1))
-    return Row.of(document, job)
+def _nothing(error: Exception) -> dict[str, Any]:
+    """Return the JSON of a record that was refused, or whose diagnosis failed."""
+    why = f"{type(error).__name__}: {error}"
+    head: dict[str, Any] = {"format": FORMAT, "verdict": "failed", "why": why}
+    if isinstance(error, InputError):
+        head |= {"verdict": "refused", "why": f"{error.key}: {error.problem}".lstrip(": ")}
+    return head | {"stages": {}, "effects": [], "rivals": [], "shrink": {}}
 
 
 def run_all(todo: list[Job], progress: Progress, workers: int = 0, cluster: str = "") -> list[Row]:
@@ -224,8 +209,11 @@ def run_all(todo: list[Job], progress: Progress, workers: int = 0, cluster: str 
     made = {number: made_by(job) for number, job in enumerate(todo)}
 
     def keep(number: int, answered: Mapping[str, Any]) -> None:
-        found[number] = _keep(todo[number], made[number], answered)
-        progress(todo[number].name, len(found), len(todo))
+        job = todo[number]
+        document = {"record": job.name, **answered, "made": made[number]}
+        write_text(job.out, json_text(document, indent=1))
+        found[number] = Row.of(document, job)
+        progress(job.name, len(found), len(todo))
 
     def calls() -> Iterator[tuple[int, Rig, str, Record, ControlName | None]]:
         for number, job in enumerate(todo):
@@ -236,7 +224,7 @@ def run_all(todo: list[Job], progress: Progress, workers: int = 0, cluster: str 
             try:
                 rig, record = read_rig(job.rig), read_record(job.record)
             except InputError as error:
-                keep(number, _nothing("refused", f"{error.key}: {error.problem}".lstrip(": ")))
+                keep(number, _nothing(error))
                 continue
             yield number, rig, str(job.record), record, job.control
 

@@ -24,6 +24,7 @@ from coupled.errors import InputError, nearest
 from coupled.flight.aircraft import make_aircraft
 from coupled.flight.altered import STILL
 from coupled.gap.signals.output import Floats, Output
+from coupled.gap.signals.reading import PRESSURE
 from coupled.gap.stages.surfaces import surface_channel, surface_points
 from coupled.gap.thresholds import (
     DOUBLED,
@@ -107,13 +108,18 @@ def _check_angles(record: Record, file: object) -> None:
 
 def _check_short(record: Record, control: ControlName, file: object) -> None:
     """Raise InputError if a short record has too few frames or swings to fit and to hold out."""
-    names = [channel(control, q) for q in ("force", "computed", "deflection")]
-    swings = min((_swings(record[name]) for name in names if name in record), default=0)
+    swings = min(map(_swings, _signals(record, control).values()), default=0)
     if len(record) < 2 * PIECE or swings < SHORT_SWINGS:
         length_s = record.time_s[-1] - record.time_s[0]
         problem = f"is {length_s:.1f} s long with {swings} swings in {len(record)} rows;"
         needed = f"{SHORTEST_RECORD_s:g} s are needed, or {SHORT_SWINGS} swings in {2 * PIECE} rows"
         raise InputError(file, "", f"{problem} {needed}")
+
+
+def _signals(record: Record, control: ControlName) -> dict[str, Floats]:
+    """Return the force on a control and its deflections, by channel, if recorded."""
+    names = (channel(control, quantity) for quantity in ("force", "computed", "deflection"))
+    return {name: record[name] for name in names if name in record}
 
 
 def _swings(signal: Floats) -> int:
@@ -125,26 +131,24 @@ def _swings(signal: Floats) -> int:
 
 def _check_channels(rig: Rig, record: Record, control: ControlName, file: object) -> None:
     """Raise InputError if a channel is stuck, a copy of another, or in another unit."""
-    names = [channel(control, q) for q in ("force", "computed", "deflection")]
-    present = [name for name in names if name in record]
-    for i, name in enumerate(present):
-        if plausible.is_constant(record[name]):
+    present = _signals(record, control)
+    for name, signal in present.items():
+        if plausible.is_constant(signal):
             raise InputError(file, name, f"never changes: {_why_constant(rig, record, control)}")
-        other = plausible.copy_of(name, {known: record[known] for known in present[: i + 1]})
+        other = plausible.copy_of(name, present)
         if other is not None:
             raise InputError(file, name, f"is a copy of {other}")
-    gradient, pressure = channel(control, "gradient"), "dynamic_pressure_Pa"
-    both = gradient in record and pressure in record
-    stuck = both and plausible.is_constant(record[pressure])
+    gradient = channel(control, "gradient")
+    both = gradient in record and PRESSURE in record
+    stuck = both and plausible.is_constant(record[PRESSURE])
     if stuck and not plausible.is_constant(record[gradient]):
-        raise InputError(file, pressure, f"never changes, while {gradient} does: it is stuck")
-    for name in present[1:] if names[0] in present else present:
-        most = float(np.max(np.abs(record[name])))
-        travel = rig.controls[control].travel
-        if most > plausible.FAR_BEYOND * travel:
-            raise InputError(
-                file, name, f"reaches {most:.3g}, beyond {travel:g}: is it in another unit?"
-            )
+        raise InputError(file, PRESSURE, f"never changes, while {gradient} does: it is stuck")
+    travel = rig.controls[control].travel
+    for name, signal in present.items():
+        most = float(np.max(np.abs(signal)))
+        if name != channel(control, "force") and most > plausible.FAR_BEYOND * travel:
+            problem = f"reaches {most:.3g}, beyond {travel:g}: is it in another unit?"
+            raise InputError(file, name, problem)
     _check_signs(rig, record, control, file)
     _check_force_unit(record, control, file)
     _check_schedule(rig, record, control, file)
@@ -152,16 +156,17 @@ def _check_channels(rig: Rig, record: Record, control: ControlName, file: object
 
 def _check_signs(rig: Rig, record: Record, control: ControlName, file: object) -> None:
     """Raise InputError if the force, or one of two deflections, has a reversed sign."""
-    force = channel(control, "force")
-    both = [channel(control, q) for q in ("computed", "deflection")]
-    moved = [name for name in both if name in record]
+    moved, force = _signals(record, control), channel(control, "force")
+    pull = moved.pop(force, None)
     if not moved:
         return
-    problem = f"moves against {moved[0]}: one of them is reversed"
-    if len(moved) == 2 and plausible.move_oppositely(record[moved[0]], record[moved[1]]):
-        raise InputError(file, moved[1], problem)
+    (first, motion), *others = moved.items()
+    problem = f"moves against {first}: one of them is reversed"
+    for name, other in others:
+        if plausible.move_oppositely(motion, other):
+            raise InputError(file, name, problem)
     passive = rig.controls[control].drive != "setpoint"
-    if passive and force in record and plausible.drives_the_hand(record[force], record[moved[0]]):
+    if passive and pull is not None and plausible.drives_the_hand(pull, motion):
         raise InputError(file, force, problem)
 
 
@@ -183,12 +188,10 @@ def check_against_model(outputs: Sequence[Output], rig: Rig, files: Sequence[obj
 
 def clipped(record: Record, control: ControlName, file: str) -> list[str]:
     """Return a sentence for each sensor of a control that stays at its largest reading."""
-    names = [channel(control, q) for q in ("force", "computed", "deflection")]
-    ends = {name: plausible.clipped_at(record[name]) for name in names if name in record}
     return [
         f"{name} of {file} is clipped at {end:.4g}; no effect explains what is lost beyond."
-        for name, end in ends.items()
-        if end is not None
+        for name, signal in _signals(record, control).items()
+        if (end := plausible.clipped_at(signal)) is not None
     ]
 
 
@@ -212,21 +215,19 @@ def _why_constant(rig: Rig, record: Record, control: ControlName) -> str:
 
 def _check_schedule(rig: Rig, record: Record, control: ControlName, file: object) -> None:
     """Raise InputError if the gradients differ from those of the rig's table."""
-    gradient, pressure = channel(control, "gradient"), "dynamic_pressure_Pa"
-    if gradient not in record or pressure not in record:
+    gradient, computed = channel(control, "gradient"), channel(control, "computed")
+    if gradient not in record or PRESSURE not in record:
         return
-    schedule, computed = rig.controls[control].schedule, channel(control, "computed")
-    specified = specified_gradient(schedule, record[pressure])
+    schedule, pressure = rig.controls[control].schedule, record[PRESSURE]
+    specified = specified_gradient(schedule, pressure)
     if schedule.curved and computed in record:
-        at = record[computed]
-        specified = replay_schedule(rig, control, record[pressure], computed=at)
+        specified = replay_schedule(rig, control, pressure, computed=record[computed])
     if np.median(specified) == 0.0:
         return
     ratio = float(np.median(record[gradient]) / np.median(specified))
     if not 1.0 / DOUBLED < ratio < DOUBLED:
-        raise InputError(
-            file, gradient, f"is {ratio:.3g} times what this rig's table gives: another rig's file?"
-        )
+        problem = f"is {ratio:.3g} times what this rig's table gives: another rig's file?"
+        raise InputError(file, gradient, problem)
 
 
 def check_trim(trim_speed_m_per_s: float, record: Record, file: object) -> None:
@@ -250,8 +251,7 @@ def _check_force_unit(record: Record, control: ControlName, file: object) -> Non
     names = [channel(control, q) for q in ("force", "computed", "gradient")]
     if any(name not in record for name in names):
         return
-    force, computed, gradient = (record[name] for name in names)
-    ratio = plausible.force_ratio(force, computed, gradient)
+    ratio = plausible.force_ratio(*(record[name] for name in names))
     if ratio is not None and plausible.in_pounds(ratio):
         raise InputError(
             file, names[0], f"is {ratio:.2f} of what deflection and gradient say: it is in pounds"
@@ -276,20 +276,18 @@ def rig_of_manifests(records: Mapping[str, Record]) -> Rig:
 
     Raises InputError if a record has no manifest with a rig, or if the rigs differ.
     """
-    found: Rig | None = None
+    found: dict[str, Rig] = {}
     for file, record in records.items():
         table = record.manifest.get("rig")
         if not isinstance(table, Mapping):
             problem = "is missing, and no manifest beside the record holds a rig: give the rig file"
             raise InputError(file, "--rig", problem)
-        rig = rig_from_table(table, f"{file} (its manifest)")
-        found = rig if found is None else found
-        if (rig.controls, rig.structure) != (found.controls, found.structure):
-            first = next(iter(records))
+        found[file] = rig = rig_from_table(table, f"{file} (its manifest)")
+        first, known = next(iter(found.items()))
+        if (rig.controls, rig.structure) != (known.controls, known.structure):
             problem = f"its manifest holds another rig than that of {first}: give the rig file"
             raise InputError(file, "--rig", problem)
-    assert found is not None
-    return found
+    return next(iter(found.values()))
 
 
 def trimmed(rig: Rig, records: Mapping[str, Record]) -> tuple[Rig, str]:
@@ -358,24 +356,25 @@ def _measured_trim(rig: Rig, record: Record, file: str) -> dict[str, Any]:
         return {}
     flight, found = rig.flight, dict[str, Any]()
     wanted = start_of(record, SPEED)
-    altitude = start_of(record, ALTITUDE) if ALTITUDE in record else flight.altitude
-    elsewhere = abs(altitude - flight.altitude) > OTHER_ALTITUDE_m
+    if ALTITUDE in record:
+        found[ALTITUDE] = start_of(record, ALTITUDE)
+    elsewhere = abs(found.get(ALTITUDE, flight.altitude) - flight.altitude) > OTHER_ALTITUDE_m
     if abs(wanted / trim_speed(rig) - 1.0) <= OTHER_SPEED and not elsewhere:
         return {}
-    if ALTITUDE in record:
-        found["altitude_m"] = altitude
     if "pitch_rad" in record and "alpha_rad" in record:
         path = start_of(record, "pitch_rad") - start_of(record, "alpha_rad")
         if abs(path - flight.flight_path) > NEGLIGIBLE:
             found["flight_path_rad"] = path
+
+    def true_speed(calibrated: float) -> float:
+        found["calibrated_airspeed_m_per_s"] = calibrated
+        return trim_speed(rig.changed({f"flight.{key}": value for key, value in found.items()}))
+
     speed = flight.calibrated_airspeed
     try:
         for _ in range(3):  # the two speeds are nearly in proportion
-            found["calibrated_airspeed_m_per_s"] = speed
-            there = rig.changed({f"flight.{key}": value for key, value in found.items()})
-            speed *= wanted / trim_speed(there)
-        found["calibrated_airspeed_m_per_s"] = speed
-        trim_speed(rig.changed({f"flight.{key}": value for key, value in found.items()}))
+            speed *= wanted / true_speed(speed)
+        true_speed(speed)
     except InputError:
         problem = (
             f"starts at {wanted:.4g}, where the rig's {flight.model} does not trim;"
