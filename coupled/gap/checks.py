@@ -253,21 +253,13 @@ def _check_force_unit(record: Record, control: ControlName, file: object) -> Non
         return
     ratio = plausible.force_ratio(*(record[name] for name in names))
     if ratio is not None and plausible.in_pounds(ratio):
-        raise InputError(
-            file, names[0], f"is {ratio:.2f} of what deflection and gradient say: it is in pounds"
-        )
+        problem = f"is {ratio:.2f} of what deflection and gradient say: it is in pounds"
+        raise InputError(file, names[0], problem)
 
 
+ALTITUDE, CALIBRATED, PATH = "altitude_m", "calibrated_airspeed_m_per_s", "flight_path_rad"
 # The keys of a rig's `flight` that define the initial trim, not the aircraft.
-TRIM_KEYS = (
-    "altitude_m",
-    "calibrated_airspeed_m_per_s",
-    "flight_path_rad",
-    "trim",
-    "landing",
-    "properties",
-)
-ALTITUDE = "altitude_m"
+TRIM_KEYS = (ALTITUDE, CALIBRATED, PATH, "trim", "landing", "properties")
 _FIELDS = file_keys(Flight, "m")
 
 
@@ -364,10 +356,10 @@ def _measured_trim(rig: Rig, record: Record, file: str) -> dict[str, Any]:
     if "pitch_rad" in record and "alpha_rad" in record:
         path = start_of(record, "pitch_rad") - start_of(record, "alpha_rad")
         if abs(path - flight.flight_path) > NEGLIGIBLE:
-            found["flight_path_rad"] = path
+            found[PATH] = path
 
     def true_speed(calibrated: float) -> float:
-        found["calibrated_airspeed_m_per_s"] = calibrated
+        found[CALIBRATED] = calibrated
         return trim_speed(rig.changed({f"flight.{key}": value for key, value in found.items()}))
 
     speed = flight.calibrated_airspeed
@@ -376,11 +368,9 @@ def _measured_trim(rig: Rig, record: Record, file: str) -> dict[str, Any]:
             speed *= wanted / true_speed(speed)
         true_speed(speed)
     except InputError:
-        problem = (
-            f"starts at {wanted:.4g}, where the rig's {flight.model} does not trim;"
-            f" the rig file has it at {trim_speed(rig):.4g}: another rig's file?"
-        )
-        raise InputError(file, SPEED, problem) from None
+        problem = f"starts at {wanted:.4g}, where the rig's {flight.model} does not trim;"
+        filed = f"the rig file has it at {trim_speed(rig):.4g}: another rig's file?"
+        raise InputError(file, SPEED, f"{problem} {filed}") from None
     return found
 
 
@@ -422,19 +412,15 @@ def at_rate_of(rig: Rig, records: Mapping[str, Record]) -> Rig:
     rate_Hz = sampling_rate_of(record, file)
     if abs(rate_Hz / rig.frame_rate - 1.0) <= TINY:
         return rig
-    wanted = rig.frame_rate * rig.flight.steps_per_frame / rate_Hz
-    steps = max(1, math.ceil(wanted - 0.01))
-    return rig.changed(
-        {"frame_rate_Hz": float(f"{rate_Hz:.6g}"), "flight.steps_per_frame": min(steps, 100)}
-    )
+    wanted = math.ceil(rig.frame_rate * rig.flight.steps_per_frame / rate_Hz - 0.01)
+    steps = min(max(1, wanted), 100)
+    return rig.changed({"frame_rate_Hz": float(f"{rate_Hz:.6g}"), "flight.steps_per_frame": steps})
 
 
 def check_moved_by_pilot(rig: Rig) -> None:
     """Raise InputError if control laws of the model move its elevator."""
     assert rig.flight is not None
     if surface_points(rig, "column") is None:
-        problem = (
-            "has control laws that move its elevator, which follow the column's command;"
-            " give a rig with [controls.column], and a record with column_estimate_m"
-        )
-        raise InputError(rig.name, "flight.model", f"{rig.flight.model} {problem}")
+        problem = "has control laws that move its elevator, which follow the column's command;"
+        remedy = "give a rig with [controls.column], and a record with column_estimate_m"
+        raise InputError(rig.name, "flight.model", f"{rig.flight.model} {problem} {remedy}")

@@ -244,8 +244,9 @@ class _Fitter:
         signal = self._signal(law, outputs)
         if signal is None or filed_curve(self.rig, self.case.control, law).nodes:
             return None
-        basis = self._basis(law, places_of(signal, law, self._entries(law)), outputs, None)
-        return None if basis is None else (basis, self._chosen(basis))
+        entries = self._entries(law)
+        basis = self._basis(law, places_of(signal, law, entries), outputs, None)
+        return None if basis is None else (basis, choose(basis, basis.sums("fitted"), entries))
 
     def _signal(self, law: Law, outputs: Sequence[Output]) -> Floats | None:
         """Return a law's signal in all of its records; None if one lacks it."""
@@ -283,10 +284,6 @@ class _Fitter:
 
     def _with(self, law: Law, values: Values) -> Rig | None:
         return with_curve(self.rig, self.case.control, law, *values)
-
-    def _chosen(self, basis: Basis) -> Pick:
-        """Return the curve of the largest evidence in the fitted stretches."""
-        return choose(basis, basis.sums("fitted"), self._entries(basis.law))
 
     def _basis(
         self, law: Law, places: Floats, outputs: Sequence[Output], about: Values | None
@@ -344,7 +341,7 @@ class _Fitter:
             again = self._basis(basis.law, basis.places, basis.outputs, pick.values(basis))
             if again is None:
                 break
-            next_pick = self._chosen(again)
+            next_pick = choose(again, again.sums("fitted"), self._entries(again.law))
             changed = self._with(again.law, next_pick.values(again))
             if changed is None:
                 break

@@ -298,6 +298,10 @@ class PartDiagnosis(Diagnosis):
         """Return the control of an effect; None for one of the airframe."""
         return self.part.owner(effect.stage)
 
+    def placed(self, stage: str) -> str:
+        """Return the name of a stage among those of all parts."""
+        return placed(stage, self.part.owner(stage))
+
     @property
     def gains(self) -> list[float]:
         """The log evidence lost without each of the effects, in their order."""
@@ -391,11 +395,7 @@ class WholeDiagnosis(Diagnosis):
     @classmethod
     def of(cls, parts: Sequence[PartDiagnosis], records: Mapping[str, Record]) -> WholeDiagnosis:
         """Return the diagnosis of all parts; the airframe is last, if it is a separate part."""
-        stages = [
-            replace(stage, name=placed(stage.name, part.part.owner(stage.name)))
-            for part in parts
-            for stage in part.stages
-        ]
+        stages = [replace(s, name=part.placed(s.name)) for part in parts for s in part.stages]
         stages.sort(key=lambda one: (not one.guilty, STAGES.index(one.name.rpartition(".")[2])))
         pool = [part for part in parts if part.effects] or parts
         widest = max((part.shrink.widest for part in pool), key=lambda one: one.before / one.floor)
@@ -417,9 +417,7 @@ class WholeDiagnosis(Diagnosis):
                 for one in part.settings
             ),
             budget=tuple(
-                replace(one, stage=placed(one.stage, part.part.owner(one.stage)))
-                for part in parts
-                for one in part.budget
+                replace(one, stage=part.placed(one.stage)) for part in parts for one in part.budget
             ),
             shrink=Shrink(widest, tuple(one for part in parts for one in part.shrink.channels)),
             nominal=_joined([part.nominal for part in parts], parts),

@@ -189,7 +189,6 @@ def closed_loop(
     return tuple(ChannelAgain(name, rms[name], rms_after[name], *seconds) for name in names)
 
 
-Owned = tuple[ControlName | None, str]
 RATES: Mapping[ControlName, tuple[str, ...]] = {
     "column": ("pitch_rate_rad_per_s", LOAD),
     "wheel": ("roll_rate_rad_per_s",),
@@ -222,7 +221,7 @@ class EffectInFlight(Plain):
 
 
 def in_flight(
-    effects: Sequence[Owned],
+    effects: Sequence[tuple[ControlName | None, str]],
     rig_with: Callable[[Sequence[int]], Rig],
     controls: Sequence[ControlName],
     again: Again,

@@ -121,21 +121,16 @@ def _what(found: Findings, floor: str) -> str:
     budgets = {one.stage: one for one in found.budget}
     stages = [found.stage(name) for name in found.guilty]
     acting = {stage.name: _acting(found, stage, budgets.get(stage.name)) for stage in stages}
-    # A stage without an output, with the effects of its neighbours, is not described again.
-    by_others = [
-        stage
-        for stage in stages
-        if stage.left is None
-        and acting[stage.name]
-        and any({*acting[stage.name]} <= {*acting.get(n, ())} for n in stage.shown_in)
-    ]
-    stages = [stage for stage in stages if stage not in by_others]
     if not any(acting.values()) and found.verdict == "unexplained":
         return f"A gap in the {', '.join(found.guilty)} that no effect of the library explains."
-    return " ".join(
-        _explained(acting[stage.name], stage, budgets.get(stage.name), floor)
-        for stage in sorted(stages, key=lambda one: not acting[one.name])
-    )
+    said = []
+    for stage in sorted(stages, key=lambda one: not acting[one.name]):
+        ours = acting[stage.name]
+        by_others = any({*ours} <= {*acting.get(name, ())} for name in stage.shown_in)
+        # A stage without an output, with the effects of its neighbours, is not described again.
+        if stage.left is not None or not ours or not by_others:
+            said.append(_explained(ours, stage, budgets.get(stage.name), floor))
+    return " ".join(said)
 
 
 def no_gap_in(controls: Sequence[str], floor: str = NOISE) -> str:
