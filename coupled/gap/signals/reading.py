@@ -367,11 +367,6 @@ class Reading:
         rows = self.services()
         return 0.0 if rows is None else rows.neutral
 
-    def asked(self) -> Floats:
-        """Return the command of the surface, d: δ̂, or as changed by a jam or the other side."""
-        rows = self.services()
-        return self.as_read("estimate") if rows is None else rows.asked
-
     def feel(self) -> Feel:
         """Return what the host specified: G_T as recorded, else of the nominal schedule at q̄.
 

@@ -20,15 +20,15 @@ from hashlib import sha256
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from coupled.errors import InputError
 from coupled.flight.gusts import DRAWN, GivenAir
+from coupled.gap.noise.noise import Floats, Noise
 from coupled.gap.noise.smooth import smoothed
 from coupled.gap.signals.air import NEEDS_ACROSS, Air, crossing_air, vertical_air
 from coupled.gap.signals.floors import left_noise
 from coupled.gap.signals.output import TRIM, Output, estimate_noise, lasting, spread, white
-from coupled.gap.stages.openloop import Between, Flown, Moved, flown_in, fly_open_loop
+from coupled.gap.stages.openloop import Between, Flown, Moved, fly_open_loop
 from coupled.gap.stages.shots import SLOW, Restarts, States, is_throttled
 from coupled.gap.stages.surfaces import (
     Trim,
@@ -49,16 +49,10 @@ from coupled.rig.rig import Rig
 from coupled.schema import changed
 from coupled.units import GRAVITY_m_per_s2
 
-Floats = NDArray[np.float64]
 RATE = "pitch_rate_rad_per_s"
-COMPARED = (
-    RATE,
-    "alpha_rad",
-    "load_factor",
-    "roll_rate_rad_per_s",
-    "yaw_rate_rad_per_s",
-    "sideslip_rad",
-)
+_LATERAL = ("roll_rate_rad_per_s", "yaw_rate_rad_per_s", "sideslip_rad")
+COMPARED = (RATE, "alpha_rad", "load_factor", *_LATERAL)
+SHOT = (RATE, *SLOW)  # channels of a flight with restarts
 _SIDE = ("forces/fby-total-lbs", "inertia/weight-lbs")
 _KEPT = 128  # size of the cache of flights: most of a search; 0.4 MB each in a minute of record
 
@@ -102,9 +96,14 @@ class Model:
     rig: Rig
     record: Record
     moved: Sequence[Moved]
-    compared: tuple[str, ...]
+    compared: tuple[str, ...] = ()
     flights: Flights = field(default_factory=Flights)
-    restarts: Restarts | None = None
+    number: int = 0  # of the record
+
+    @cached_property
+    def restarts(self) -> Restarts | None:
+        """The measured states from which speed and attitude are predicted."""
+        return Restarts.of(self.record, self.rig.frame_rate)
 
     @cached_property
     def side_m_per_s2(self) -> Floats | None:
@@ -152,10 +151,9 @@ class Model:
         """Return the compared channels and the trim of `rig`; None if it cannot be trimmed."""
         return self._flown(rig)[0]
 
-    def shots(self, rig: Rig) -> Floats | None:
-        """Return speed and pitch attitude with restarts; None if `rig` cannot be trimmed."""
-        flown = self._flown(rig)[1]
-        return None if flown is None else flown.motion[:, 1:]
+    def shots(self, rig: Rig) -> Flown | None:
+        """Return `SHOT` with restarts; None if `rig` cannot be trimmed."""
+        return self._flown(rig)[1]
 
     def _flown(self, rig: Rig) -> list[Flown | None]:
         """Return the flight of `rig`, and that with restarts if they are known.
@@ -163,7 +161,7 @@ class Model:
         The two are flown at once: what compares one of them compares the other too.
         """
         assert rig.flight is not None
-        flight = changed(rig.flight, {"motion_stamp_s": 0.0}, self.rig.name, "flight")
+        flight = _in_time(rig)
         # The air is estimated from the recorded motion, so it has the same late time stamps.
         late = rig.flight.motion_stamp * self.rig.frame_rate
         driven, states = _digest(self.moved), self.restarts
@@ -186,40 +184,37 @@ class Model:
 
     def unknown_between(self, plain: Floats) -> Floats:
         """Return the change of the flight by another interpolation between the rows."""
-        assert self.rig.flight is not None
-        if self.rig.controls or self.rig.flight.steps_per_frame == 1:
+        flight = _in_time(self.rig)
+        if self.rig.controls or flight.steps_per_frame == 1:
             return np.zeros_like(plain)
-        flight = changed(self.rig.flight, {"motion_stamp_s": 0.0}, self.rig.name, "flight")
         return self.fly(flight, self.moved, between="spline").motion - plain
 
     def restarted(self) -> Floats:
-        """Return the change of speed and attitude by restarts from the model's own states.
+        """Return the change of `SHOT` by restarts from the model's own states.
 
         It is numerical error, and what a state that is not recorded changes.
         """
-        assert self.rig.flight is not None and self.restarts is not None
-        flight = changed(self.rig.flight, {"motion_stamp_s": 0.0}, self.rig.name, "flight")
-        names = tuple(self.restarts.recorded)
-        plain = self.fly(flight, self.moved, channels=(RATE, *names)).motion[:, 1:]
-        states = self.restarts.rows(dict(zip(names, plain.T, strict=True)))
-        again = self.fly(flight, self.moved, restarts=states).motion[:, 1:]
-        return again - plain[:, [names.index(name) for name in SLOW]]
+        assert self.restarts is not None
+        flight, channels = _in_time(self.rig), (RATE, *self.restarts.recorded)
+        plain = self.fly(flight, self.moved, channels=channels).motion
+        states = self.restarts.rows(dict(zip(channels[1:], plain[:, 1:].T, strict=True)))
+        again = self.fly(flight, self.moved, restarts=states).motion
+        return again - plain[:, [channels.index(name) for name in SHOT]]
 
-    def wrong_shots(self, wrong: Sequence[Sequence[Moved]], plain: Floats) -> list[Floats]:
-        """Return the changes of speed and attitude by errors of surfaces, air and restarts."""
-        assert self.rig.flight is not None and self.restarts is not None
-        flight = changed(self.rig.flight, {"motion_stamp_s": 0.0}, self.rig.name, "flight")
-        restarts = [self.restarts.wrong(sample) for sample in range(len(wrong))]
-        given = list(zip(wrong, restarts, strict=True))
-        flown = in_threads(lambda one: self.fly(flight, one[0], True, restarts=one[1]), given)
-        return [one.motion[:, 1:] - plain for one in flown]
+    def carried(
+        self, wrong: Sequence[Sequence[Moved]], plain: Floats, by_shots: bool = False
+    ) -> list[Floats]:
+        """Return the changes of the flight by errors of the surfaces' motion and of the air.
 
-    def carried(self, wrong: Sequence[Sequence[Moved]], plain: Floats) -> list[Floats]:
-        """Return the changes of the flight by errors of the surfaces' motion and of the air."""
-        assert self.rig.flight is not None
-        flight = changed(self.rig.flight, {"motion_stamp_s": 0.0}, self.rig.name, "flight")
-        flown = in_threads(lambda one: self.fly(flight, one, with_error=True), wrong)
-        return [one.motion - plain for one in flown]
+        `by_shots`: those of `SHOT`, by errors of the restarts too.
+        """
+        flight, restarts = _in_time(self.rig), self.restarts if by_shots else None
+
+        def change(sample: int) -> Floats:
+            states = None if restarts is None else restarts.wrong(sample)
+            return self.fly(flight, wrong[sample], True, restarts=states).motion - plain
+
+        return in_threads(change, range(len(wrong)))
 
     def fly(
         self,
@@ -239,13 +234,18 @@ class Model:
         slow ones.
         """
         air = self.air(flight, late, with_error) if air is None else air
-        controls, rate_Hz = flown_by(self.rig), self.rig.frame_rate
-        channels = channels or (self.compared if restarts is None else (RATE, *SLOW))
-        given = (flight, rate_Hz, controls, moved, channels)
-        known = flown_in(self.record, controls, rate_Hz)
-        between = "held" if self.rig.controls else between
-        fly = partial(fly_open_loop, *given, known, air=air, between_rows=between)
-        return in_turn(partial(fly, restarts=restarts))
+        channels = channels or (self.compared if restarts is None else SHOT)
+        given = (flight, self.rig.frame_rate, flown_by(self.rig), moved, channels, self.record)
+        rows = "held" if self.rig.controls else between
+        return in_turn(
+            partial(fly_open_loop, *given, air=air, between_rows=rows, restarts=restarts)
+        )
+
+
+def _in_time(rig: Rig) -> Flight:
+    """Return the aircraft of a rig whose motion has no late time stamps."""
+    assert rig.flight is not None
+    return changed(rig.flight, {"motion_stamp_s": 0.0}, rig.name, "flight")
 
 
 def has_gusts(flight: Flight) -> bool:
@@ -286,8 +286,7 @@ def gusts_of(rig: Rig, record: Record) -> Model | None:
     """Return the aircraft of a record, which estimates the motion of the air; None for a bench."""
     if rig.flight is None or any(name not in record for name in needs(rig, record)):
         return None
-    right, _, _ = _driven(rig, record)
-    return Model(rig, record, right, (), restarts=Restarts.of(record, rig.frame_rate))
+    return Model(rig, record, _driven(rig, record)[0])
 
 
 def _driven(
@@ -302,10 +301,7 @@ def _driven(
 
 
 def airframe_outputs(
-    rig: Rig,
-    record: Record,
-    number: int = 0,
-    flights: Flights | None = None,
+    rig: Rig, record: Record, number: int = 0, flights: Flights | None = None
 ) -> list[Output]:
     """Return the airframe's outputs; empty for a bench, or if channels are missing.
 
@@ -323,70 +319,72 @@ def airframe_outputs(
     compared = tuple(name for name in wanted if np.ptp(record[name]) > 0.0)
     right, wrong, trims = _driven(rig, record)
     known = Flights() if flights is None else flights
-    model = Model(rig, record, right, compared, known, Restarts.of(record, rig.frame_rate))
+    model = Model(rig, record, right, compared, known, number)
     flown = model.flown(rig)
     assert flown is not None  # the filed rig can be trimmed
     carried = known.errors("open loop", rig.flight, lambda: model.carried(wrong, flown.motion))
     unknown = model.unknown_between(flown.motion)
     outputs = []
     for i, name in enumerate(compared):
-        noise = left_noise(
-            estimate_noise(record[name]), record[name], record[name] - flown.motion[:, i]
-        )
-        own = float(np.hypot(noise.rms, KNOWN * np.ptp(record[name])))
-        errors = [one[:, i] for one in carried]
-        moved_by = float(np.sqrt(np.mean(np.square(errors)) + np.mean(unknown[:, i] ** 2)))
-        floor = float(np.hypot(own, moved_by))
-        loose = spread(errors, own, noise.memory, rig.frame_rate)
-
-        def predict(other: Rig, i: int = i, name: str = name, floor: float = floor) -> Floats:
-            assert other.flight is not None
-            made = model.flown(other)
-            if made is None:
-                return record[name] + FAR * floor
-            late = other.flight.motion_stamp * other.frame_rate
-            return stamped(np.asarray(made.motion[:, i]), late)
-
-        given = (record[name], predict, floor, rig.frame_rate, number, loose, moved_by / floor)
-        lasts = lasting(errors, floor)
-        outputs.append(Output("airframe", name, *given, errors=errors, lasts=lasts))
+        measured = record[name]
+        noise = left_noise(estimate_noise(measured), measured, measured - flown.motion[:, i])
+        own = float(np.hypot(noise.rms, KNOWN * np.ptp(measured)))
+        errors, between = [one[:, i] for one in carried], float(np.mean(unknown[:, i] ** 2))
+        outputs.append(_output(model, name, model.flown, i, noise, own, errors, between))
     if model.restarts is not None and not is_throttled(record):
-        outputs += _slow_outputs(model, wrong, number)
+        outputs += _slow_outputs(model, wrong)
     if "column" in trims:
-        outputs.append(_trim_output(model, record, trims["column"], number))
+        outputs.append(_trim_output(model, trims["column"]))
     return outputs
 
 
-def _slow_outputs(model: Model, wrong: Sequence[Sequence[Moved]], number: int) -> list[Output]:
+def _slow_outputs(model: Model, wrong: Sequence[Sequence[Moved]]) -> list[Output]:
     """Return speed and pitch attitude, predicted in segments restarted as measured."""
-    record, rate_Hz = model.record, model.rig.frame_rate
-    shots = model.shots(model.rig)
-    assert shots is not None  # the filed rig can be trimmed
-    flight = model.rig.flight
-    assert flight is not None
-    carried = model.flights.errors("shots", flight, lambda: model.wrong_shots(wrong, shots))
-    (restarted,) = model.flights.errors("restarts", flight, lambda: [model.restarted()])
+    record, flight, shots = model.record, model.rig.flight, model.shots(model.rig)
+    assert flight is not None and shots is not None  # the filed rig can be trimmed
+    errors_of, plain = model.flights.errors, shots.motion
+    carried = errors_of("shots", flight, lambda: model.carried(wrong, plain, by_shots=True))
+    (restarted,) = errors_of("restarts", flight, lambda: [model.restarted()])
     outputs = []
-    for i, name in enumerate(SLOW):
-        noise = left_noise(estimate_noise(record[name]), record[name], record[name] - shots[:, i])
-        known = KNOWN * np.ptp(record[name])
+    for i, name in enumerate(SHOT[1:], 1):
+        measured = record[name]
+        noise = left_noise(estimate_noise(measured), measured, measured - plain[:, i])
+        known = KNOWN * np.ptp(measured)
         own = float(np.sqrt(noise.rms**2 + known**2 + np.mean(restarted[:, i] ** 2)))
         errors = [one[:, i] for one in carried]
-        moved_by = float(np.sqrt(np.mean(np.square(errors))))
-        floor = float(np.hypot(own, moved_by))
-        loose = spread(errors, own, noise.memory, rate_Hz)
-
-        def predict(other: Rig, i: int = i, name: str = name, floor: float = floor) -> Floats:
-            assert other.flight is not None
-            made = model.shots(other)
-            if made is None:
-                return record[name] + FAR * floor
-            return stamped(np.asarray(made[:, i]), other.flight.motion_stamp * rate_Hz)
-
-        given = (record[name], predict, floor, rate_Hz, number, loose, moved_by / floor)
-        lasts = lasting(errors, floor)
-        outputs.append(Output("airframe", name, *given, errors=errors, lasts=lasts))
+        outputs.append(_output(model, name, model.shots, i, noise, own, errors))
     return outputs
+
+
+def _output(
+    model: Model,
+    name: str,
+    flown: Callable[[Rig], Flown | None],
+    column: int,
+    noise: Noise,
+    own: float,
+    errors: Sequence[Floats],
+    between: float = 0.0,
+) -> Output:
+    """Return a channel as an output, predicted by a column of a flight of a rig.
+
+    The floor is `own`, the propagated `errors`, and the mean square `between` of what happens
+    between the rows.
+    """
+    measured, rate_Hz = model.record[name], model.rig.frame_rate
+    moved_by = float(np.sqrt(np.mean(np.square(errors)) + between))
+    floor = float(np.hypot(own, moved_by))
+
+    def predict(rig: Rig) -> Floats:
+        assert rig.flight is not None
+        made = flown(rig)
+        if made is None:
+            return measured + FAR * floor
+        return stamped(np.asarray(made.motion[:, column]), rig.flight.motion_stamp * rate_Hz)
+
+    loose, lasts = spread(errors, own, noise.memory, rate_Hz), lasting(errors, floor)
+    given = (measured, predict, floor, rate_Hz, model.number, loose, moved_by / floor)
+    return Output("airframe", name, *given, errors=errors, lasts=lasts)
 
 
 def _known_motion(rig: Rig, record: Record) -> tuple[str, ...]:
@@ -402,12 +400,12 @@ def _known_motion(rig: Rig, record: Record) -> tuple[str, ...]:
     return tuple(name for name in known if name not in LATERAL)
 
 
-def _trim_output(model: Model, record: Record, trim: Trim, number: int) -> Output:
+def _trim_output(model: Model, trim: Trim) -> Output:
     """Return the elevator position in trim as an output, with the noise of its channel.
 
     The trim is measured over a part of the rows, so the noise floor is higher than the noise.
     """
-    position, at = record[surface_channel("column")], flown_by(model.rig).index("column")
+    position, at = model.record[surface_channel("column")], flown_by(model.rig).index("column")
     noise = position - smoothed(position)
     noise *= white(position) / max(float(np.std(noise)), 1e-12)
     floor = max(trim.error * math.sqrt(len(position)), 1e-9)
@@ -417,5 +415,5 @@ def _trim_output(model: Model, record: Record, trim: Trim, number: int) -> Outpu
         place = trim.measured + FAR * floor if made is None else made.trim[at]
         return np.full(len(position), place)
 
-    rate_Hz = model.rig.frame_rate
-    return Output("airframe", TRIM, trim.measured + noise, predict, floor, rate_Hz, number)
+    given = (trim.measured + noise, predict, floor, model.rig.frame_rate, model.number)
+    return Output("airframe", TRIM, *given)

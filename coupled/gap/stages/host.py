@@ -34,16 +34,6 @@ class Product:
 
     reading: Reading
 
-    @property
-    def name(self) -> str:
-        """The name of its channel."""
-        return self.reading.name_of("modifying_force")
-
-    @property
-    def recorded(self) -> Floats:
-        """F_mod as recorded, N."""
-        return self.reading.signal("modifying_force")
-
     @cached_property
     def own(self) -> Noise:
         """The noise of the channel, from its spectrum."""
@@ -81,7 +71,7 @@ class Product:
             sensed, smooth = of.sensed(rig), self._likely if seen is None else seen
             still = smooth - sensed.hum(self._computed)
             read = sensed.before_curve(still / sensed.scale(len(smooth)))
-        return np.where(self.unsure, self.recorded, self._made(read, rig))
+        return np.where(self.unsure, of.signal("modifying_force"), self._made(read, rig))
 
     def noisy(self, rig: Rig, k: int) -> Floats:
         """Return the product with the k-th sample of the noise of δc."""
@@ -132,8 +122,8 @@ class Product:
         return replay_product(rig, of.control, place, self._feel, missed, more)
 
 
-def compensated(reading: Reading) -> tuple[str, Floats, Predict, float, float]:
-    """Return the channel, δ̂ as recorded, its prediction by a rig, its floor, and F's part of it, d.
+def compensated(reading: Reading) -> tuple[Predict, float, float]:
+    """Return the prediction of δ̂ by a rig, its floor, and F's part of the floor, d.
 
     The floor is the noise of δc, although the host reads the same noise, because F may be stamped
     slightly late. If the rig's F is late, the record's noise of F may differ from the host's.
@@ -156,5 +146,4 @@ def compensated(reading: Reading) -> tuple[str, Floats, Predict, float, float]:
         level, late = reading.driving("force"), reading.sensed(rig).as_the_host_had_it
         shaken = late(unsmoothed(recorded, 0, level)), unsmoothed(late(recorded), 0, level)
         carried = math.hypot(*(float(np.std(made(rig, f) - predict(rig))) for f in shaken))
-    floor, name = math.hypot(own, carried), reading.name_of("estimate")
-    return name, reading.signal("estimate"), predict, floor, carried
+    return predict, math.hypot(own, carried), carried

@@ -24,7 +24,6 @@ from coupled.flight.airframe import JSBSimAirframe
 from coupled.flight.altered import STILL
 from coupled.flight.everyframe import PROPERTIES
 from coupled.flight.gusts import DRAWN, GivenAir, Gusts
-from coupled.flight.wrapper import Wrapper
 from coupled.gap.signals.conditions import trim_shift, wrappers_of
 from coupled.gap.stages.shots import States
 from coupled.gap.thresholds import LOST_MOTION, SAME_TRIM_rad
@@ -37,7 +36,6 @@ from coupled.units import FOOT_m
 
 Floats = NDArray[np.float64]
 Points = tuple[Floats, Floats]
-FlownIn = tuple[Sequence[Wrapper], Floats]
 Between = Literal["held", "pchip", "spline"]
 _SI = {"true_airspeed_m_per_s": FOOT_m, "altitude_m": FOOT_m}  # JSBSim has the others in SI
 
@@ -93,23 +91,13 @@ class Flown:
     trim: tuple[float, ...]  # rad, in the order of the controls
 
 
-def flown_in(record: Record, controls: Sequence[ControlName], frame_rate_Hz: float) -> FlownIn:
-    """Return the conditions of a record's flight, and the commands by which they move the trim.
-
-    The commands have the shape (frames, controls). Recorded surface positions include them.
-    """
-    frame_s = 1.0 / frame_rate_Hz
-    trims = np.column_stack([trim_shift(record, control, frame_s) for control in controls])
-    return wrappers_of(record, frame_s), trims
-
-
 def fly_open_loop(
     flight: Flight,
     frame_rate_Hz: float,
     controls: Sequence[ControlName],
     moved: Sequence[Moved],
     channels: Sequence[str],
-    flown: FlownIn | None = None,
+    record: Record | None = None,
     *,
     air: GivenAir = DRAWN,
     between_rows: Between = "held",
@@ -117,22 +105,22 @@ def fly_open_loop(
 ) -> Flown:
     """Return the flight of a model from its trim, driven by its surfaces; a row for each frame.
 
-    A channel may be any property of the model, in JSBSim's unit; it is 0 if the model lacks it.
-    `air` is the motion of the air. The conditions of the record's
-    flight (`flown_in`) act on the model as on the aircraft. `between_rows` is how the commands
-    change over a frame of several steps: `held`, as those of a host, or interpolated. `restarts`
-    are states of the motion from which the flight goes on, by row. Raises InputError if the model
-    cannot be trimmed.
+    A channel may be any property of the model, in JSBSim's unit; it is 0 if the model lacks it. The
+    conditions of the flight of a `record` act on the model as on the aircraft; recorded surface
+    positions include their shift of the trim. `air` is the motion of the air. `between_rows` is how
+    the commands change over a frame of several steps: `held`, as those of a host, or interpolated.
+    `restarts` are states of the motion from which the flight goes on, by row. Raises InputError if
+    the model cannot be trimmed.
     """
     still = changed(flight, STILL, "rig", "flight")
     frame_s, steps = 1.0 / frame_rate_Hz, 1
+    conditions = [] if record is None else wrappers_of(record, frame_s)
+    shifts = [0.0 if record is None else trim_shift(record, one, frame_s)[:-1] for one in controls]
     if between_rows != "held" and flight.steps_per_frame > 1:
         steps = flight.steps_per_frame
         still = changed(still, {"steps_per_frame": 1}, "rig", "flight")
         frame_s /= steps
         air = air.repeated(steps)
-    conditions: Sequence[Wrapper] = () if flown is None else flown[0]
-    trims = None if flown is None else flown[1]
     gusts = Gusts(still, frame_s, air=air)
     models = [aircraft_folder()]
     airframe = make_aircraft(still, frame_s, controls, models, conditions=conditions, gusts=gusts)
@@ -141,8 +129,8 @@ def fly_open_loop(
     asked = np.zeros((len(moved[0].values) + 1, 3))
     for i, (one, own) in enumerate(zip(moved, trim, strict=True)):
         asked[:-1, i] = one.commands(own)
-        if trims is not None and one.points is not None:
-            asked[1:-1, i] -= trims[:-1, i]  # a row results from the frame before it
+        if one.points is not None:
+            asked[1:-1, i] -= shifts[i]  # a row results from the frame before it
     asked[-1] = asked[-2]
     asked = asked[1:] if steps == 1 else _between(asked, steps, between_rows)
     states = {row * steps: state for row, state in (restarts or {}).items()}

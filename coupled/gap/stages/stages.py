@@ -18,7 +18,6 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,7 +48,7 @@ from coupled.gap.stages.inputs import (
     without_friction_creep,
 )
 from coupled.gap.stages.openloop import about
-from coupled.gap.stages.surfaces import filed_trim
+from coupled.gap.stages.surfaces import asked_of, filed_trim
 from coupled.gap.stages.trim import trim_of
 from coupled.gap.thresholds import (
     KNOWN,
@@ -66,29 +65,11 @@ from coupled.gap.thresholds import (
 from coupled.parallel import in_threads
 from coupled.rig.hosted import Hosted
 from coupled.rig.nodes import Nodes
-from coupled.rig.replay import (
-    drive_linkage,
-    drive_loader,
-    replay_schedule,
-    replay_surface,
-)
+from coupled.rig.replay import drive_linkage, drive_loader, replay_schedule, replay_surface
 from coupled.rig.rig import Rig
 from coupled.rig.serving import held_force
 
 STEPPED = ("loader", "linkage")  # stages that run at the loader's own steps
-
-
-class DrivenBy(NamedTuple):
-    """The quantity of a control that is a stage's input.
-
-    `between` is the rms error of the prediction because the inputs between frames are unknown.
-    """
-
-    quantity: str = ""
-    between: float = 0.0
-
-
-UNDRIVEN = DrivenBy()
 
 
 def hosted_by(reading: Reading) -> Hosted:
@@ -133,38 +114,37 @@ class Reader(Reading):
     def _made(
         self,
         stage: str,
-        name: str,
-        measured: Floats,
+        quantity: str,
         predict: Predict,
         noisy: Callable[[Rig, int], Floats],
         own: Noise,
-        driven_by: DrivenBy = UNDRIVEN,
+        driven_by: str = "",
+        between: float = 0.0,
         judged: NDArray[np.bool_] | None = None,
         correlated: Floats | None = None,
     ) -> Output:
         """Return an output whose floor is its own noise and its input's, propagated.
 
         The prediction of frames that are not `judged` is the measurement. For an output that is
-        `driven_by` a quantity of the control, `hidden_gap` is set. The part of the residual that
+        `driven_by` a quantity of the control, `hidden_gap` is set. `between` is the rms error of
+        the prediction because the inputs between frames are unknown. The part of the residual that
         is proportional to `correlated` does not count as noise.
         """
+        name, measured = self.name_of(quantity), self.signal(quantity)
         base = predict(self.rig)
         own = left_noise(own, measured, remove_projection(measured - base, correlated), judged)
         tries = in_threads(lambda k: noisy(self.rig, k) - base, range(TRIES))
         carried = _rms(np.array(tries))
         known = REPLAY_KNOWN * float(np.ptp(measured))
-        floor = math.hypot(own.rms, carried, driven_by.between, known)
+        floor = math.hypot(own.rms, carried, between, known)
         made = self._output(stage, name, measured, predict, floor)
         if floor <= 0.0:
             return made
-        made = replace(
-            made,
-            spread=spread(tries, own.rms, own.memory, self.rig.frame_rate),
-            smoothed=carried / floor,
-        )
-        if not driven_by.quantity:
+        loose = spread(tries, own.rms, own.memory, self.rig.frame_rate)
+        made = replace(made, spread=loose, smoothed=carried / floor)
+        if not driven_by:
             return made
-        noisiest = self.name_of(driven_by.quantity) if carried > own.rms else name
+        noisiest = self.name_of(driven_by) if carried > own.rms else name
         return replace(made, hidden_gap=HiddenGap(floor / float(np.std(measured)), noisiest, name))
 
     def _output(
@@ -179,7 +159,6 @@ class Reader(Reading):
         level, ran = noise_in(self.rig, "dynamic_pressure_Pa", pressure), ~self.missed.seen
         own = noise_in(self.rig, self.name_of("gradient"), gradient[ran])
         smooth = smoothed(pressure)
-
         at = self.as_read("computed") - self.neutral() if self.schedule.curved else None
 
         def predict(rig: Rig, q: Floats = smooth) -> Floats:
@@ -190,24 +169,20 @@ class Reader(Reading):
         share, rest = share_from_source(gradient[ran], predict(self.rig, pressure)[ran])
         if share > SMALL:
             # G_T contains the noise of the recorded q̄, so the host computed it from that q̄.
-            def as_read(rig: Rig) -> Floats:
-                return predict(rig, pressure)
-
             floor = max(rest, ROUNDING_SPAN * float(np.ptp(gradient)))
-            return [self._output("schedule", self.name_of("gradient"), gradient, as_read, floor)]
+            as_read, name = partial(predict, q=pressure), self.name_of("gradient")
+            return [self._output("schedule", name, gradient, as_read, floor)]
 
         def noisy(rig: Rig, k: int) -> Floats:
             return predict(rig, with_error(smooth, k, level))
 
-        return [self._made("schedule", self.name_of("gradient"), gradient, predict, noisy, own)]
+        return [self._made("schedule", "gradient", predict, noisy, own)]
 
     def _loader(self) -> list[Output]:
         force, feel, computed = self.pulled(), self.feel(), self.signal("computed")
         inputs_of, hosted = self.other_inputs(), hosted_by(self)
-        smooth, own = (
-            smoothed(computed, sensor := self.driving("computed")),
-            self.channel_noise("computed"),
-        )
+        sensor, own = self.driving("computed"), self.channel_noise("computed")
+        smooth = smoothed(computed, sensor)
         leaks = [Nodes(smoothed(other)) for other in self.partner()]
         restarted = drifts(self.rig, self.control, float(np.min(feel.gradient)))
 
@@ -244,11 +219,14 @@ class Reader(Reading):
 
             return at
 
+        def plain(at: Driven) -> Predict:
+            return self._judged(lambda rig: at(rig, 0.0), computed)
+
         def predicted(at: Driven, times: float = 1.0) -> Predict:
             def walked(rig: Rig) -> Floats:
                 return without_friction_creep(rig, self.control, at, computed, times)
 
-            return self._judged(walked if walks else lambda rig: at(rig, 0.0), computed)
+            return self._judged(walked, computed) if walks else plain(at)
 
         def noisy(rig: Rig, k: int) -> Floats:
             seen = with_error(smooth, k + TRIES, sensor)
@@ -264,18 +242,14 @@ class Reader(Reading):
         answer = driven(force.smooth, smooth)
         walks = force.smooth is not force.recorded
         walks = walks and creeps(self.rig, self.control, answer, own.rms)
-        made = (self.name_of("computed"), computed, predicted(answer), noisy, own)
-        between = driven(force.smooth, smooth, otherwise=True)(self.rig, 0.0)
-        driven_by = DrivenBy("force", _rms(between - answer(self.rig, 0.0)))
-        whole = self._made("loader", *made, driven_by, judged=self.judged).under(force.noise)
+        otherwise = driven(force.smooth, smooth, otherwise=True)(self.rig, 0.0)
+        given = ("force", _rms(otherwise - answer(self.rig, 0.0)), self.judged)
+        whole = self._made("loader", "computed", predicted(answer), noisy, own, *given)
+        whole = whole.under(force.noise)
         if not restarted:
             every = self._restarts(round(PIECE_s * self.rig.frame_rate))
-            shot = driven(force.smooth, smooth, every)
-            shots = self._judged(lambda rig: shot(rig, 0.0), computed)
-            whole = replace(whole, shots=shots)
-        if not walks:
-            return [whole]
-        return [replace(whole, rough=self._judged(lambda rig: answer(rig, 0.0), computed))]
+            whole = replace(whole, shots=plain(driven(force.smooth, smooth, every)))
+        return [replace(whole, rough=plain(answer)) if walks else whole]
 
     def _restarts_that_show(
         self, moved: Callable[[Floats, Mask], Floats], force: Floats, noise: float
@@ -323,29 +297,26 @@ class Reader(Reading):
         force = self._without_answered_noise(self.pulled(), grip)
         series = Series(self, force, hosted_by(self))
         own = self.channel_noise("deflection")
-        driven_by = DrivenBy("force")
         predict = self._judged(series.predict(own), grip)
 
         def noisy(rig: Rig, k: int) -> Floats:
             return self._judged(partial(series.noisy, k=k), grip)(rig)
 
-        made = (self.name_of("deflection"), grip, predict, noisy, own, driven_by)
-        found = replace(self._made("loader", *made, judged=self.judged), in_series=True)
-        return [found.under(series.force.noise)]
+        given = (predict, noisy, own, "force")
+        found = self._made("loader", "deflection", *given, judged=self.judged)
+        return [replace(found, in_series=True).under(force.noise)]
 
     def _answering(self) -> list[Output]:
         """Return the force as the output under an imposed motion."""
         motion, force = Imposed(self), self.signal("force")
         own = min(self.driving("force"), between_jumps(force), key=lambda one: one.rms)  # backlash
-        made = (force, motion.predict(), motion.noisy, own, DrivenBy(self.imposed))
-        return [self._made("loader", self.name_of("force"), *made)]
+        return [self._made("loader", "force", motion.predict(), motion.noisy, own, self.imposed)]
 
     def _multiplier(self) -> list[Output]:
         product = Product(self)
-        made = (product.name, product.recorded, product.predict, product.noisy, product.own)
-        return [
-            self._made("multiplier", *made, judged=~product.unsure, correlated=product.correlated)
-        ]
+        made = ("modifying_force", product.predict, product.noisy, product.own)
+        judged, correlated = ~product.unsure, product.correlated
+        return [self._made("multiplier", *made, judged=judged, correlated=correlated)]
 
     def _linkage(self) -> list[Output]:
         computed, measured = self.signal("computed"), self.signal("deflection")
@@ -370,22 +341,19 @@ class Reader(Reading):
             )
 
         def noisy(rig: Rig, k: int) -> Floats:
-            pulled = force.with_error(k + TRIES)
-            return driven(command.with_error(k), pulled)(rig)
+            return driven(command.with_error(k), force.with_error(k + TRIES))(rig)
 
         given, predict = (command.smooth, force.smooth), driven(command.smooth, force.smooth)
-        between = driven(*given, otherwise=True)(self.rig) - predict(self.rig)
-        made = (measured, predict, noisy, self.channel_noise("deflection"))
-        driven_by = DrivenBy("computed", _rms(between))
-        name = self.name_of("deflection")
-        linkage = self._made("linkage", name, *made, driven_by, judged=self.judged)
+        between = _rms(driven(*given, otherwise=True)(self.rig) - predict(self.rig))
+        made = (predict, noisy, self.channel_noise("deflection"), "computed", between)
+        linkage = self._made("linkage", "deflection", *made, self.judged)
         # A bend adds to δc; with set points the whole motion is the servo's.
-        handed_on = None if self.set_points else computed
-        return [replace(linkage, handed_on=handed_on)]
+        return [replace(linkage, handed_on=None if self.set_points else computed)]
 
     def _compensation(self) -> list[Output]:
         """Return δ̂, predicted by the host's equations from δc and F as read."""
-        name, estimate, predict, floor, carried = compensated(self)
+        predict, floor, carried = compensated(self)
+        name, estimate = self.name_of("estimate"), self.signal("estimate")
         found = self._output("compensation", name, estimate, predict, floor)
         return [replace(found, smoothed=carried / floor) if floor else found]
 
@@ -393,26 +361,21 @@ class Reader(Reading):
         points = None if self.rig.flight is None else self.surface_points(self.rig, self.control)
         if points is None:
             return []
-        commands_at, positions = points
-        estimate, measured = self.asked(), self.record[self.surface]
+        estimate, measured = asked_of(self.record, self.control), self.record[self.surface]
         trim = trim_of(self.rig, self.record, self.control)
         filed = filed_trim(self.rig, self.control)
         held = 0.0 if trim is None else about(trim.position, filed, points)
         pressure = self.record["dynamic_pressure_Pa"]
-        command = replay_surface(self.rig, self.control, estimate, pressure)
-
         shift = trim_shift(self.record, self.control, 1.0 / self.rig.frame_rate)
 
-        def position(wanted: Floats) -> Floats:
-            """Return the surface position; a row results from the command in the row before."""
-            asked = np.concatenate(([0.0], (wanted + shift)[:-1]))
-            return np.interp(held + asked, commands_at, positions)
-
         def predict(rig: Rig) -> Floats:
-            return position(replay_surface(rig, self.control, estimate, pressure))
+            """Return the surface position; a row results from the command in the row before."""
+            wanted = replay_surface(rig, self.control, estimate, pressure)
+            asked = np.concatenate(([0.0], (wanted + shift)[:-1]))
+            return np.interp(held + asked, *points)
 
         # The host's noise is in δ̂ and moves the surface, so the floor is the sensor's noise.
-        left = measured - position(command)
+        left = measured - predict(self.rig)
         own = left_noise(estimate_noise(left), measured, left)
         floor = float(np.hypot(own.rms, KNOWN * np.ptp(measured)))
         return [self._output("surface", self.surface, measured, predict, floor)]

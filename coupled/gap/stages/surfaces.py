@@ -9,7 +9,7 @@ stage is not judged. Without a command in the record, the surface is led to wher
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -89,14 +89,17 @@ def _unaltered(rig: Rig) -> tuple[str, tuple[ControlName, ...], float]:
 def _points(
     flight: str, controls: tuple[ControlName, ...], rate_Hz: float, control: ControlName
 ) -> Points | None:
-    plain = Flight.model_validate_json(flight)
-
-    def model() -> JSBSimAirframe:
-        return make_aircraft(plain, 1.0 / rate_Hz, controls, [aircraft_folder()])
-
-    if _moves_itself(model(), controls, rate_Hz, control):
+    if _moves_itself(_aircraft(flight, controls, rate_Hz), controls, rate_Hz, control):
         return None
-    return model().surface_map(surface_channel(control))
+    return _aircraft(flight, controls, rate_Hz).surface_map(surface_channel(control))
+
+
+def _aircraft(
+    flight: str, controls: tuple[ControlName, ...], rate_Hz: float, name: str = "rig"
+) -> JSBSimAirframe:
+    """Return the aircraft of a flight section in JSON, trimmed."""
+    section = Flight.model_validate_json(flight)
+    return make_aircraft(section, 1.0 / rate_Hz, controls, [aircraft_folder()], name)
 
 
 def _moves_itself(
@@ -145,8 +148,7 @@ def own_trim(rig: Rig, control: ControlName) -> float:
 def _trim(
     flight: str, controls: tuple[ControlName, ...], rate_Hz: float, name: str
 ) -> tuple[float, ...]:
-    still = Flight.model_validate_json(flight)
-    motion = make_aircraft(still, 1.0 / rate_Hz, controls, [aircraft_folder()], name).motion()
+    motion = _aircraft(flight, controls, rate_Hz, name).motion()
     every = motion_channels(controls, flown=True)
     return tuple(motion[every.index(surface_channel(control))] for control in controls)
 
@@ -162,42 +164,39 @@ def moved(
     In the order of `flown_by`. `trims` are those of the record; a jump is not smoothed. A control
     without any channel in the record is taken as not moved.
     """
-    found = list[Moved]()
-    wrong = list[Moved]()
-    for control in flown_by(rig):
-        name, points = surface_channel(control), surface_points(rig, control)
-        if is_led(rig, record, control):
-            level = estimate_noise(record[name])
-            smooth = smoothed(record[name])
-            error = Smoother.of(record[name]).wiener_error(level, len(smooth), rng)
-            gain = _gain_of(rig, control)
-            found.append(Moved(name, smooth, gain=gain))
-            wrong.append(Moved(name, smooth + error, gain=gain))
-            continue
-        if name not in record or points is None:
-            one = Moved(name, _asked(rig, record, control))
-            found, wrong = [*found, one], [*wrong, one]
-            continue
-        position, filed = record[name], filed_trim(rig, control)
-        trim = trims.get(control, Trim(filed, filed, 0.0))
-        given = (points, trim.measured, filed, TRIM_SIGMAS * trim.error)
-        if VALIDITY in record:  # the surface of a live flight is the model's: no noise
-            one = Moved(name, position, *given)
-            found, wrong = [*found, one], [*wrong, one]
-            continue
-        step = np.where(np.arange(len(position)) > 0, trim.jump, 0.0)
-        left = position - _led(rig, record, control, trim.position)
-        level = left_noise(estimate_noise(position), position, left)
-        if float(np.std(left)) < MOST * estimate_noise(position).rms:
-            # The command explains its roughness, so that is motion of the surface, not noise.
-            smooth, error = position, level.sample(len(position), rng)
-            error *= min(1.0, float(np.std(left)) / max(level.rms, 1e-300))
-        else:
-            smooth = smoothed(position - step) + step
-            error = Smoother.of(position - step).wiener_error(level, len(smooth), rng)
-        found.append(Moved(name, smooth, *given))
-        wrong.append(Moved(name, smooth + error, *given))
-    return found, wrong
+    each = [_moved(rig, record, control, trims.get(control), rng) for control in flown_by(rig)]
+    wrong = [
+        one if error is None else replace(one, values=one.values + error) for one, error in each
+    ]
+    return [one for one, _ in each], wrong
+
+
+def _moved(
+    rig: Rig, record: Record, control: ControlName, trim: Trim | None, rng: np.random.Generator
+) -> tuple[Moved, Floats | None]:
+    """Return the motion of a surface, and a sample of its error, rad; None if it has no error."""
+    name, points = surface_channel(control), surface_points(rig, control)
+    if is_led(rig, record, control):
+        position, gain = record[name], _gain_of(rig, control)
+        error = Smoother.of(position).wiener_error(estimate_noise(position), len(position), rng)
+        return Moved(name, smoothed(position), gain=gain), error
+    if name not in record or points is None:
+        return Moved(name, _asked(rig, record, control)), None
+    position, filed = record[name], filed_trim(rig, control)
+    trim = trim or Trim(filed, filed, 0.0)
+    given = (points, trim.measured, filed, TRIM_SIGMAS * trim.error)
+    if VALIDITY in record:  # the surface of a live flight is the model's: no noise
+        return Moved(name, position, *given), None
+    left, estimated = position - _led(rig, record, control, trim.position), estimate_noise(position)
+    level = left_noise(estimated, position, left)
+    if float(np.std(left)) < MOST * estimated.rms:
+        # The command explains its roughness, so that is motion of the surface, not noise.
+        error = level.sample(len(position), rng)
+        error *= min(1.0, float(np.std(left)) / max(level.rms, 1e-300))
+        return Moved(name, position, *given), error
+    step = np.where(np.arange(len(position)) > 0, trim.jump, 0.0)
+    error = Smoother.of(position - step).wiener_error(level, len(position), rng)
+    return Moved(name, smoothed(position - step) + step, *given), error
 
 
 def is_led(rig: Rig, record: Record, control: ControlName) -> bool:
@@ -215,11 +214,11 @@ def _gain(
     flight: str, controls: tuple[ControlName, ...], rate_Hz: float, control: ControlName
 ) -> float:
     """Return how far a surface goes with its command within a frame, rad; 0 if it goes later."""
-    plain, at = Flight.model_validate_json(flight), controls.index(control)
+    at = controls.index(control)
     surface = motion_channels(controls, flown=True).index(surface_channel(control))
 
     def place(command: float, frames: int) -> float:
-        airframe = make_aircraft(plain, 1.0 / rate_Hz, controls, [aircraft_folder()])
+        airframe = _aircraft(flight, controls, rate_Hz)
         first, second, third = (command * (i == at) for i in range(3))
         for _ in range(frames):
             airframe.step((first, second, third))
@@ -241,10 +240,14 @@ def _led(rig: Rig, record: Record, control: ControlName, trim: float) -> Floats:
 
 def _asked(rig: Rig, record: Record, control: ControlName) -> Floats:
     """Return the host's command of a surface; zero if the record has no estimate."""
-    name, pressure = channel(control, "estimate"), "dynamic_pressure_Pa"
-    if name not in record or pressure not in record:
+    pressure = "dynamic_pressure_Pa"
+    if channel(control, "estimate") not in record or pressure not in record:
         return np.zeros(len(record))
-    served = service_rows(record, control)
-    wanted = record[name] if served is None else served.asked
-    asked = replay_surface(rig, control, wanted, record[pressure])
+    asked = replay_surface(rig, control, asked_of(record, control), record[pressure])
     return np.concatenate(([0.0], asked[:-1]))
+
+
+def asked_of(record: Record, control: ControlName) -> Floats:
+    """Return the recorded command of a surface, d: δ̂, or as changed by a jam or the other side."""
+    rows = service_rows(record, control)
+    return record[channel(control, "estimate")] if rows is None else rows.asked

@@ -37,7 +37,7 @@ from coupled.gap.effects.settings import Scales, in_scale
 from coupled.gap.noise.smooth import smoothed
 from coupled.gap.signals.output import Floats, Output, estimate_noise
 from coupled.gap.stages.airframe import RATE, needs
-from coupled.gap.stages.openloop import flown_in, fly_open_loop
+from coupled.gap.stages.openloop import fly_open_loop
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import flown_by, moved
 from coupled.gap.thresholds import (
@@ -307,9 +307,8 @@ def with_terms(library: Sequence[Effect], rig: Rig, records: Mapping[str, Record
 def large_terms(rig: Rig, record: Record, axes: Mapping[str, str]) -> set[str]:
     """Return the functions whose share of their axis in a record is at least `NEGLIGIBLE`."""
     assert rig.flight is not None
-    controls = flown_by(rig)
     surfaces, _ = moved(rig, record, {}, np.random.default_rng(43))
-    given = (rig.flight, rig.frame_rate, controls, surfaces, (RATE, *axes))
-    flown = fly_open_loop(*given, flown_in(record, controls, rig.frame_rate))
+    given = (rig.flight, rig.frame_rate, flown_by(rig), surfaces, (RATE, *axes), record)
+    flown = fly_open_loop(*given)
     values = dict(zip(axes, flown.motion[:, 1:].T, strict=True))
     return {one.term for one in shares(axes, values) if (one.share or 0.0) >= NEGLIGIBLE}

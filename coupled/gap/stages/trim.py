@@ -23,9 +23,10 @@ from numpy.typing import NDArray
 from coupled.gap.noise.smooth import smoothed
 from coupled.gap.signals.conditions import trim_shift
 from coupled.gap.signals.output import estimate_noise, memory, white
-from coupled.gap.stages.openloop import about, flown_in, fly_open_loop
+from coupled.gap.stages.openloop import about, fly_open_loop
 from coupled.gap.stages.surfaces import (
     Trim,
+    asked_of,
     filed_trim,
     flown_by,
     moved,
@@ -51,7 +52,6 @@ from coupled.record.channels import ControlName, channel
 from coupled.record.record import Record
 from coupled.rig.replay import replay_surface
 from coupled.rig.rig import Rig
-from coupled.rig.serving import service_rows
 
 Floats = NDArray[np.float64]
 WEIGHED = ("pitch_rate_rad_per_s", "alpha_rad", "load_factor")
@@ -130,13 +130,11 @@ def _standing_off(
     larger for each of these times, the shortest is used. Return None if the record does not have
     the command.
     """
-    name, pressure = channel(control, "estimate"), "dynamic_pressure_Pa"
+    estimate, pressure = channel(control, "estimate"), "dynamic_pressure_Pa"
     points = surface_points(rig, control)
-    if name not in record or pressure not in record or points is None:
+    if estimate not in record or pressure not in record or points is None:
         return None
-    served = service_rows(record, control)
-    wanted = record[name] if served is None else served.asked
-    measured = record[surface_channel(control)]
+    wanted, measured = asked_of(record, control), record[surface_channel(control)]
     held = about(trim, filed_trim(rig, control), points)
     noise = estimate_noise(measured)
     crowded = (1.0 + noise.memory) / (1.0 - noise.memory)  # variance of a mean, over white noise's
@@ -201,8 +199,8 @@ def _followed(
     lefts = []
     for trim in (one, other):
         surfaces, _ = moved(rig, short, {control: trim}, np.random.default_rng(43))
-        given = (rig.flight, rig.frame_rate, flown_by(rig), surfaces, names)
-        flown = fly_open_loop(*given, flown_in(short, flown_by(rig), rig.frame_rate))
+        given = (rig.flight, rig.frame_rate, flown_by(rig), surfaces, names, short)
+        flown = fly_open_loop(*given)
         left = np.column_stack([short[n] - flown.motion[:, i] for i, n in enumerate(names)])
         linear = _lagged(smoothed(short[surface_channel(control)]), rig.frame_rate)
         left -= linear @ np.linalg.lstsq(linear, left, rcond=None)[0]
