@@ -168,8 +168,8 @@ def test_a_reading_is_inverted_along_its_curve(first: float) -> None:
     curved = RIG.changed({key: {"deflection_m": nodes, "reading_m": reading}})
     sensed = Sensed(curved, "column")
     true = np.linspace(-0.04, 0.04, 41)
-    assert not np.allclose(sensed.along_curve(true), true)
-    assert sensed.before_curve(sensed.along_curve(true)) == pytest.approx(true, abs=1e-7)
+    assert not np.allclose(sensed.curve.at(true), true)
+    assert sensed.curve.inverse(sensed.curve.at(true)) == pytest.approx(true, abs=1e-7)
     table = {"deflection_m": nodes, "reading_m": reading}
     changes = {"grip_curve": table, "deflection_zero_m": 0.01}
     at_grip = Sensed(
@@ -180,7 +180,7 @@ def test_a_reading_is_inverted_along_its_curve(first: float) -> None:
     loaded = Sensed(
         at_grip.rig.changed({"controls.column.sensing.grip_load_curve": by_force}), "column"
     )
-    assert at_grip.at_grip(true, force) == pytest.approx(sensed.along_curve(true) + 0.01)
+    assert at_grip.at_grip(true, force) == pytest.approx(sensed.curve.at(true) + 0.01)
     assert loaded.at_grip(true, force) == pytest.approx(at_grip.at_grip(true, force) - 0.2 * true)
     for one in (at_grip, loaded):
         read = one.at_grip(true, force)

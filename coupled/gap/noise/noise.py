@@ -113,7 +113,9 @@ def noise_of(signal: Floats) -> Noise:
     high = at >= NOISE_FROM * math.pi
     if not np.all(levels[high] > 0.0):
         return plain
-    sure, variance = levels[high], _log_variance(rough)
+    sure = levels[high]
+    # Of the logarithm of a band's mean: with the taper about two of three bins are independent.
+    variance = 1.5 / (len(rough) / 2.0 / NOISE_BANDS)
     least = float(np.median(sure[-3:]))
     if least < MINOR * float(np.median(sure[:3])):
         return Noise(math.sqrt(least), filtered=True)
@@ -158,15 +160,6 @@ def _bands(rough: Floats) -> tuple[Floats, Floats]:
         quiet = np.sort(power[part])[: max(1, round(NEARLY_ALL * len(part)))]
         levels.append(float(np.mean(quiet)) / biased)
     return np.array([float(np.mean(omega[part])) for part in parts]), np.array(levels)
-
-
-def _log_variance(rough: Floats) -> float:
-    """Return the variance of the logarithm of a band's mean.
-
-    With the taper about two of three bins are independent.
-    """
-    bins = len(rough) / 2.0 / NOISE_BANDS
-    return 1.5 / bins
 
 
 def _shape(at: Floats, memory: float) -> Floats:

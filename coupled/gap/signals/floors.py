@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.gap.noise.corners import Corners
-from coupled.gap.noise.noise import Noise, jumps, noise_of_input, quiet_noise
+from coupled.gap.noise.noise import Noise, jumps, quiet_noise
 from coupled.gap.noise.smooth import Rest, Smoother, rest_of
-from coupled.gap.signals.output import Floats, estimate_noise, rounding
+from coupled.gap.signals.output import Floats, above_rounding, estimate_noise, rounding
 from coupled.gap.thresholds import FEW_FRAMES, SHORT_FRAMES, SIGMAS, TINY
 from coupled.rig.nodes import coarsely, on_nodes
 from coupled.rig.rig import Rig
@@ -37,12 +37,6 @@ def given_noise(rig: Rig, channel: str, signal: Floats) -> Noise:
     return Noise(known or max(least, rounding(signal, np.inf)))
 
 
-def input_noise(estimated: Noise, signal: Floats) -> Noise:
-    """Return the noise of a stage's input; at least its rounding."""
-    found = None if estimated.filtered else noise_of_input(signal)
-    return estimated if found is None else _no_less(found, signal)
-
-
 def left_noise(
     estimated: Noise, signal: Floats, left: Floats, judged: NDArray[np.bool_] | None = None
 ) -> Noise:
@@ -56,7 +50,7 @@ def left_noise(
     rows = np.ones(len(left), dtype=bool) if judged is None else judged
     found = None if estimated.filtered else quiet_noise(left[rows])
     if found is not None and found.rms <= SIGMAS * estimated.rms:
-        estimated = _no_less(found, signal)
+        estimated = above_rounding(found, signal)
     share = float(np.mean(rows)) or 1.0
     return replace(estimated, rms=estimated.rms * math.sqrt(share))
 
@@ -69,12 +63,6 @@ def remove_projection(left: Floats, onto: Floats | None) -> Floats:
     """
     power = 0.0 if onto is None else float(onto @ onto)
     return left if onto is None or power == 0.0 else left - float(left @ onto) / power * onto
-
-
-def _no_less(found: Noise, signal: Floats) -> Noise:
-    """Return a noise that is at least a signal's rounding."""
-    rough = float(np.sqrt(np.mean(np.diff(signal, 4) ** 2) / 70.0))
-    return replace(found, rms=max(found.rms, rounding(signal, rough)))
 
 
 def with_error(signal: Floats, k: int, level: Noise, with_corners: bool = False) -> Floats:

@@ -119,8 +119,8 @@ def live_of(record: Record) -> Live | None:
         _runs(received, clock.jumps), key=lambda run: run.stop - run.start, default=slice(0)
     )
     assumed = settings.assumed()
-    words = _words(frame_s, sampled, bridged, validity, other, clock)
-    return Live(judged, starts, quiet, signals, assumed, (*words, *map(_in_words, assumed.items())))
+    words = _words(frame_s, sampled, bridged, validity, other, clock, assumed)
+    return Live(judged, starts, quiet, signals, assumed, tuple(words))
 
 
 def judged_part(record: Record, file: object) -> Record:
@@ -140,9 +140,8 @@ def judged_part(record: Record, file: object) -> Record:
             f" {frame_s * whole:.1f} s; {STRETCH_s:g} s are needed, and {SHORTEST_RECORD_s:g} s of"
             " record"
         )
-        raise InputError(
-            file, VALIDITY, " ".join((f"{problem}.", *live.left_out)).removesuffix(".")
-        )
+        words = " ".join((f"{problem}.", *live.left_out)).removesuffix(".")
+        raise InputError(file, VALIDITY, words)
     return record.rows(0, whole)
 
 
@@ -261,7 +260,7 @@ class _Settings:
     """
 
     def __init__(self, record: Record, live: Mapping[str, Any], frame_s: float) -> None:
-        self._time, self._frame_s = record.time_s, frame_s
+        self._time = record.time_s
         events = sorted(_events(live, frame_s), key=lambda event: event[0])
         self._events = [event for event in events if event[0] <= self._time[-1]]
         self._first = _first_settings(record)
@@ -306,15 +305,6 @@ class _Settings:
         return found
 
 
-def _in_words(one: tuple[str, Assumed]) -> str:
-    """Return the change of a control's K̂ in flight, in words."""
-    control, used = one
-    least = min(float(used.estimate.min()), float(used.gradient.min()))
-    most = max(float(used.estimate.max()), float(used.gradient.max()))
-    span = f"{least:+.3g} to {most:+.3g} {unit_of(control)}/N"
-    return f"The {control}'s K̂ in use changed by {span} in flight: each row has its own."
-
-
 def _events(live: Mapping[str, Any], frame_s: float) -> Iterator[tuple[float, str, str, float]]:
     """Yield the changes: time from which it acts, s, control, setting and new value.
 
@@ -354,7 +344,13 @@ def _first_settings(record: Record) -> dict[str, dict[str, float]]:
 
 
 def _words(
-    frame_s: float, sampled: Mask, bridged: Mask, validity: Floats, other: Mask, clock: _Clock
+    frame_s: float,
+    sampled: Mask,
+    bridged: Mask,
+    validity: Floats,
+    other: Mask,
+    clock: _Clock,
+    assumed: Mapping[str, Assumed],
 ) -> Iterator[str]:
     """Yield what is not judged in a record, or judged with changes, a sentence each."""
 
@@ -377,3 +373,8 @@ def _words(
         yield f"Left out: {span_s:g} s after each of {count} frames that the host missed."
     if clock.problem:
         yield f"{clock.problem}: its samples are taken at the host's frames."
+    for control, used in assumed.items():
+        least = min(float(used.estimate.min()), float(used.gradient.min()))
+        most = max(float(used.estimate.max()), float(used.gradient.max()))
+        span = f"{least:+.3g} to {most:+.3g} {unit_of(control)}/N"
+        yield f"The {control}'s K̂ in use changed by {span} in flight: each row has its own."

@@ -41,16 +41,14 @@ class Missed:
     def under(self, rig: Rig, control: ControlName) -> Mask | None:
         """Return the frames that a rig's host would miss; None if it misses none."""
         share = rig.controls[control].compensation.missed_share
-        return None if share == 0.0 else self._chances() < share
-
-    def _chances(self) -> Floats:
-        """Return each frame's number: the record's missed frames have the lowest ones."""
+        if share == 0.0:
+            return None
         rng, frames = np.random.default_rng(17), len(self.seen)
         missed = rng.permutation(np.flatnonzero(self.seen))
         others = rng.permutation(np.flatnonzero(~self.seen[1:]) + 1)
         chances = np.ones(frames)  # the first frame is never missed
         chances[np.concatenate((missed, others))] = (np.arange(frames - 1) + 0.5) / frames
-        return chances
+        return np.asarray(chances < share)
 
 
 def missed_in(record: Record) -> Missed:

@@ -256,9 +256,8 @@ class Output:
     @property
     def does(self) -> float:
         """The standard deviation of the stage's own motion, in the channel's unit."""
-        return float(
-            np.std(self.measured if self.handed_on is None else self.measured - self.handed_on)
-        )
+        own = self.measured if self.handed_on is None else self.measured - self.handed_on
+        return float(np.std(own))
 
     def samples(self, left: Floats) -> float:
         """Return the effective samples of a residual: its frames over its autocorrelation time.
@@ -285,11 +284,12 @@ def white(signal: Floats) -> float:
 
 
 def estimate_noise(signal: Floats) -> Noise:
-    """Return the noise in a smooth signal (`noise`).
+    """Return the noise in a smooth signal, at least its rounding, which may not be white."""
+    return above_rounding(noise_of(signal), signal)
 
-    It is at least the rounding, which is not white in a slow signal.
-    """
-    noise = noise_of(signal)
+
+def above_rounding(noise: Noise, signal: Floats) -> Noise:
+    """Return a noise that is at least the rounding of a signal."""
     rough = float(np.sqrt(np.mean(np.diff(signal, 4) ** 2) / 70.0))
     return replace(noise, rms=max(noise.rms, rounding(signal, rough)))
 

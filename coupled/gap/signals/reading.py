@@ -15,16 +15,17 @@ from functools import cached_property
 import numpy as np
 
 from coupled.gap.noise.lines import projected
-from coupled.gap.noise.noise import Noise, noise_of
+from coupled.gap.noise.noise import Noise, noise_of, noise_of_input
 from coupled.gap.noise.smooth import smoothed
-from coupled.gap.signals.floors import Drive, floor_from, input_noise, noise_in
+from coupled.gap.signals.floors import Drive, floor_from, noise_in
 from coupled.gap.signals.live import Assumed, Live, Mask, live_of
 from coupled.gap.signals.missed import Missed, missed_in
-from coupled.gap.signals.output import Floats
+from coupled.gap.signals.output import Floats, above_rounding
 from coupled.gap.thresholds import MINOR, NEGLIGIBLE, PARTLY, SETTLE_s, SHORTEST_RECORD_s
 from coupled.record.channels import SURFACES, ControlName, channel
 from coupled.record.record import Record
 from coupled.rig.crossing import leaking
+from coupled.rig.curves import DeflectionReading
 from coupled.rig.equations import specified_gradient
 from coupled.rig.hosted import Feel, OtherInputs
 from coupled.rig.nodes import on_nodes
@@ -49,17 +50,15 @@ class Sensed:
 
     def at_grip(self, shown: Floats, force: Floats) -> Floats:
         """Return the reading of the grip's transducer, d, from its deflection on the arc, and F."""
-        curve = self._of.grip_curve
-        return self._loaded(force) + (curve.at(shown) if curve.nodes else shown)
+        return self._loaded(force) + self._of.grip_curve.at(shown)
 
     def from_grip(self, read: Floats, force: Floats) -> Floats:
         """Return the deflection at the grip, d, from the reading of its transducer, and F in N."""
         return self._of.grip_curve.inverse(read - self._loaded(force))
 
-    def _loaded(self, force: Floats) -> Floats | float:
+    def _loaded(self, force: Floats) -> Floats:
         """Return what the reading at the grip has beyond its curve, d."""
-        curve, zero = self._of.grip_load_curve, self._of.deflection_zero
-        return zero + curve.at(force) if curve.nodes else zero
+        return self._of.deflection_zero + self._of.grip_load_curve.at(force)
 
     def hum(self, read: Floats) -> Floats | float:
         """Return the mains hum at each frame in δc as read, d."""
@@ -68,28 +67,17 @@ class Sensed:
             return 0.0
         turn = 2.0 * math.pi * of.hum_frequency / self.rig.frame_rate
         at = turn * np.arange(len(read))
-        if self.number == 0:
-            return np.asarray(of.hum * np.sin(at + of.hum_phase))
-        phase = projected(np.diff(read, 4), turn).phase - 2.0 * turn  # phase of four differences
+        phase = of.hum_phase
+        if self.number != 0:
+            phase = projected(np.diff(read, 4), turn).phase - 2.0 * turn  # of four differences
         return np.asarray(of.hum * np.sin(at + phase))
 
-    def hum_on_nodes(self, read: Floats) -> Floats | float:
-        """Return the hum on the loader's nodes, along the spline used for a record."""
-        return on_nodes(self.rig, hum) if isinstance(hum := self.hum(read), np.ndarray) else hum
-
-    def scale(self, frames: int) -> Floats | float:
-        """Return the ratio of δc as read to δc, at each frame."""
-        return self._scale(frames, self.rig.frame_rate)
-
-    def scale_on_nodes(self, nodes: int) -> Floats | float:
-        """Return the ratio of δc as read to δc, at each of the loader's nodes."""
-        return self._scale(nodes, self.rig.frame_rate * self.rig.substeps)
-
-    def _scale(self, samples: int, rate_Hz: float) -> Floats | float:
+    def scale(self, samples: int, steps: int = 1) -> Floats | float:
+        """Return the ratio of δc as read to δc at samples, so many `steps` of which are a frame."""
         of = self._of
         if of.scale_drift == 0.0:
             return of.read_scale
-        times_s = np.arange(samples, dtype=np.float64) / rate_Hz
+        times_s = np.arange(samples, dtype=np.float64) / (self.rig.frame_rate * steps)
         # The search may try a drift by which the scale would reach 0, and nothing is divided by 0.
         return np.asarray(of.read_scale * np.maximum(1.0 + of.scale_drift * times_s, NEGLIGIBLE))
 
@@ -108,22 +96,19 @@ class Sensed:
 
         `read` is δc as recorded, which gives the phase of the hum.
         """
-        still = computed - self.hum_on_nodes(read)
-        true = self.before_curve(still / self.scale_on_nodes(len(computed)))
+        hum = self.hum(read)
+        still = computed - (on_nodes(self.rig, hum) if isinstance(hum, np.ndarray) else hum)
+        true = self.curve.inverse(still / self.scale(len(computed), self.rig.substeps))
         return true, self.force(recorded)
 
     def as_the_host_had_it(self, recorded: Floats) -> Floats:
         """Return F as the host read it, N: without the delay of the recorder's time stamps."""
         return stamped(recorded, -self._of.force_stamp * self.rig.frame_rate)
 
-    def along_curve(self, computed: Floats) -> Floats:
-        """Return δc by the transducer's curve, before its scale, d."""
-        curve = self._of.deflection_curve
-        return curve.at(computed) if curve.nodes else computed
-
-    def before_curve(self, read: Floats) -> Floats:
-        """Return δc whose value by the transducer's curve is given, d."""
-        return self._of.deflection_curve.inverse(read)
+    @property
+    def curve(self) -> DeflectionReading:
+        """The curve of the transducer of δc, before its scale."""
+        return self._of.deflection_curve
 
     def _unread(self, read: Floats) -> Floats:
         of = self._of
@@ -183,11 +168,6 @@ class Reading:
         """Return K̂ in use, if it changed in flight."""
         return None if self.live is None else self.live.assumed.get(self.control)
 
-    @property
-    def surface(self) -> str:
-        """The channel of the control's surface."""
-        return f"{SURFACES[self.control]}_rad"
-
     def signal(self, quantity: str) -> Floats:
         """Return a control's channel; of a live loader, at equal steps of its clock."""
         return self._measured(channel(self.control, quantity))
@@ -243,37 +223,41 @@ class Reading:
     def others(self, as_read: bool = False) -> dict[str, Floats]:
         """Return the forces in N on other controls of a common structure, if recorded.
 
-        As the host read them, or of a live loader at equal steps of its clock.
+        As the host read them, or smoothed, of a live loader at equal steps of its clock.
         """
         if self.rig.structure.stands_apart:
             return {}
         held = {str(n): channel(n, "force") for n in self.rig.controls if n != self.control}
-        taken = self.record.__getitem__ if as_read else self._measured
-        return {name: taken(force) for name, force in held.items() if force in self.record}
+        held = {name: force for name, force in held.items() if force in self.record}
+        if as_read:
+            return {name: self.record[force] for name, force in held.items()}
+        return {name: smoothed(self._measured(force)) for name, force in held.items()}
 
     def missing(self) -> dict[str, list[str]]:
         """Return the channels that each stage needs and the record does not have."""
         if not self.rig.controls:  # an aircraft alone has none of these stages
             return {}
+        feel = self._feel_from()
+
+        def of(*quantities: str) -> list[str]:
+            return [self.name_of(quantity) for quantity in quantities]
+
         needs = {
-            "schedule": [PRESSURE, self.name_of("gradient")]
-            + [self.name_of("computed")] * self.schedule.curved,
-            "loader": [self.name_of(q) for q in ("force", "computed")] + self._feel_from(),
-            "multiplier": [self.name_of(q) for q in ("computed", "modifying_force")]
-            + self._feel_from(),
-            "linkage": [self.name_of(q) for q in ("computed", "force", "deflection")],
-            "compensation": [self.name_of(q) for q in ("computed", "force", "estimate")],
-            "surface": [self.name_of("estimate"), PRESSURE, self.surface],
+            "schedule": [PRESSURE, *of("gradient"), *of("computed") * self.schedule.curved],
+            "loader": [*of("force", "computed"), *feel],
+            "multiplier": [*of("computed", "modifying_force"), *feel],
+            "linkage": of("computed", "force", "deflection"),
+            "compensation": of("computed", "force", "estimate"),
+            "surface": [*of("estimate"), PRESSURE, f"{SURFACES[self.control]}_rad"],
         }
         if self.moved:
-            loader = [self.name_of("force"), self.name_of(self.imposed), *self._feel_from()]
+            loader = [*of("force", self.imposed), *feel]
             needs = {"schedule": needs["schedule"], "loader": loader}
         elif self.in_series:
             del needs["linkage"]
-            needs["loader"] = [self.name_of(q) for q in ("force", "deflection")]
-            needs["loader"] += self._feel_from()
+            needs["loader"] = [*of("force", "deflection"), *feel]
         elif self.set_points:  # without the force only a bend cannot be identified
-            needs["linkage"] = [self.name_of(q) for q in ("computed", "deflection")]
+            needs["linkage"] = of("computed", "deflection")
         lacking = {s: [n for n in names if n not in self.record] for s, names in needs.items()}
         return {stage: names for stage, names in lacking.items() if names}
 
@@ -393,7 +377,9 @@ class Reading:
 
     def driving(self, quantity: str) -> Noise:
         """Return the noise of a control's channel as an input, without a broadband signal."""
-        return input_noise(self.channel_noise(quantity), self._quiet(self.name_of(quantity)))
+        estimated, signal = self.channel_noise(quantity), self._quiet(self.name_of(quantity))
+        found = None if estimated.filtered else noise_of_input(signal)
+        return estimated if found is None else above_rounding(found, signal)
 
     def filtered(self) -> dict[str, str]:
         """Return {filtered channel of the control: source of its noise floor}."""
@@ -419,14 +405,13 @@ def softest_gradient(rig: Rig, control: ControlName, record: Record) -> float:
 
     Of a curve, that of its softest segment.
     """
-    gradient, pressure = channel(control, "gradient"), "dynamic_pressure_Pa"
-    schedule = rig.controls[control].schedule
+    gradient, schedule = channel(control, "gradient"), rig.controls[control].schedule
     if schedule.curved:
         return min(map(min, schedule.segments))
     if gradient in record:
         return float(np.min(record[gradient]))
-    if pressure in record:
-        return float(np.min(specified_gradient(schedule, record[pressure])))
+    if PRESSURE in record:
+        return float(np.min(specified_gradient(schedule, record[PRESSURE])))
     return min(schedule.total_gradient)
 
 

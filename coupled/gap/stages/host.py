@@ -70,7 +70,7 @@ class Product:
         else:
             sensed, smooth = of.sensed(rig), self._likely if seen is None else seen
             still = smooth - sensed.hum(self._computed)
-            read = sensed.before_curve(still / sensed.scale(len(smooth)))
+            read = sensed.curve.inverse(still / sensed.scale(len(smooth)))
         return np.where(self.unsure, of.signal("modifying_force"), self._made(read, rig))
 
     def noisy(self, rig: Rig, k: int) -> Floats:

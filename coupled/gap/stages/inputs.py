@@ -68,9 +68,8 @@ def without_backlash_creep(rig: Rig, control: ControlName, at: Driven, measured:
     `at` gives the response with a multiple of a sample of input noise added; shapes (frames,).
     """
     loader = rig.controls[control].loader
-    if loader.play == 0.0 and loader.bend_hysteresis_share == 0.0:
-        return at(rig, 0.0)
-    return _without_creep(measured, *in_threads(partial(at, rig), (0.0, 1.0, -1.0)))
+    may_creep = loader.play != 0.0 or loader.bend_hysteresis_share != 0.0
+    return _without_creep(rig, at, measured) if may_creep else at(rig, 0.0)
 
 
 def without_friction_creep(
@@ -80,9 +79,8 @@ def without_friction_creep(
 
     The force contains `times` the noise that the smoother passes.
     """
-    if rig.controls[control].loader.friction_stiffness == 0.0 or not is_dry(rig, control):
-        return at(rig, 0.0)
-    return _without_creep(measured, *in_threads(partial(at, rig), (0.0, times, -times)))
+    may_creep = rig.controls[control].loader.friction_stiffness != 0.0 and is_dry(rig, control)
+    return _without_creep(rig, at, measured, times) if may_creep else at(rig, 0.0)
 
 
 def creeps(rig: Rig, control: ControlName, at: Driven, noise: float) -> bool:
@@ -103,13 +101,14 @@ def creeps(rig: Rig, control: ControlName, at: Driven, noise: float) -> bool:
     return bool(walked > LESSER * shaken)
 
 
-def _without_creep(measured: Floats, plain: Floats, up: Floats, down: Floats) -> Floats:
-    """Return a response without creep, from two responses with as much noise again.
+def _without_creep(rig: Rig, at: Driven, measured: Floats, times: float = 1.0) -> Floats:
+    """Return a response without creep, from two responses with `times` the noise in addition.
 
     The predicted creep is removed unless this increases the mean square residual. Between the two
     shares of `CREEP_WORSE` it is removed in part. A fitted backlash absorbs a small creep, so that
     the residual does not show it.
     """
+    plain, up, down = in_threads(partial(at, rig), (0.0, times, -times))
     push = RATCHET * (plain - 0.5 * (up + down))
     before, after = (float(np.mean((measured - one) ** 2)) for one in (plain, plain + push))
     some, much = CREEP_WORSE
@@ -127,7 +126,7 @@ class Imposed:
         self._feel = reading.feel()
         self._inputs = reading.other_inputs()
         self._force = reading.pulled()
-        self._others = {name: smoothed(other) for name, other in reading.others().items()}
+        self._others = reading.others()
 
     def predict(self, motion: Floats | None = None, force: Floats | None = None) -> Predict:
         """Return the prediction for a motion as read, d at each frame; default: the record's.
@@ -146,7 +145,8 @@ class Imposed:
                 grip = read_as.from_grip(moved, bending)
                 return behind_linkage(rig, reading.control, grip, bending, self._others)
             nodes = imposed.of(rig)
-            return read_as.before_curve(np.asarray(nodes / read_as.scale_on_nodes(len(nodes))))
+            scaled = nodes / read_as.scale(len(nodes), rig.substeps)
+            return read_as.curve.inverse(np.asarray(scaled))
 
         def predicted(rig: Rig) -> Floats:
             data, true = rig.controls[reading.control], at_loader(rig)
@@ -154,9 +154,8 @@ class Imposed:
             late_s = data.sensing.force_stamp - data.loader.delay
 
             def read(force: Floats) -> Floats:
-                curve = data.sensing.force_curve
-                force = curve.at(force) if curve.nodes else force
-                gauged = data.sensing.force_scale * force + data.sensing.force_zero
+                shown = data.sensing.force_curve.at(force)
+                gauged = data.sensing.force_scale * shown + data.sensing.force_zero
                 return stamped(gauged, late_s * rig.frame_rate)
 
             force = read(answer.force)
@@ -198,7 +197,7 @@ class Series:
         self._feel = reading.feel()
         self._inputs = reading.other_inputs()
         self._grip = smoothed(reading.signal("deflection"))
-        self._others = {name: smoothed(other) for name, other in reading.others().items()}
+        self._others = reading.others()
         self._leaks = [Nodes(smoothed(other)) for other in reading.partner()]
         self._trembling = force.passed(np.random.default_rng(47))
         self._trembling_nodes = Nodes(self._trembling)
@@ -269,8 +268,8 @@ class Series:
         if self._walks is None:
             answer = self._driven(force.smooth)
             walks = force.smooth is not force.recorded
-            given = (self._reading.rig, self._reading.control, answer, own.rms)
-            self._walks = walks and creeps(*given)
+            reading = self._reading
+            self._walks = walks and creeps(reading.rig, reading.control, answer, own.rms)
         return self._predicted(force.smooth, 1.0)
 
     def noisy(self, rig: Rig, k: int) -> Floats:

@@ -48,7 +48,7 @@ from coupled.gap.stages.inputs import (
     without_friction_creep,
 )
 from coupled.gap.stages.openloop import about
-from coupled.gap.stages.surfaces import asked_of, filed_trim
+from coupled.gap.stages.surfaces import asked_of, filed_trim, surface_channel
 from coupled.gap.stages.trim import trim_of
 from coupled.gap.thresholds import (
     KNOWN,
@@ -204,7 +204,7 @@ class Reader(Reading):
                 still = rate
                 if rate is not seen and isinstance(hum, np.ndarray):
                     still = rate - rate_of(hum, self.rig.frame_rate)
-                place = sensed.before_curve((seen - hum) / scale)
+                place = sensed.curve.inverse((seen - hum) / scale)
                 restart = (starts, place, still / scale)
                 pull = sensed.force_on_nodes(nodes.of(rig), f)
                 if times:
@@ -215,7 +215,7 @@ class Reader(Reading):
                 host = host._replace(missed=self.missed.under(rig, self.control))
                 driven_by = (pull, feel, misread + hum, inputs_of(rig), restart, host)
                 moved = drive_loader(rig, self.control, *driven_by)[0]
-                return scale * sensed.along_curve(moved) + hum
+                return scale * sensed.curve.at(moved) + hum
 
             return at
 
@@ -321,8 +321,7 @@ class Reader(Reading):
     def _linkage(self) -> list[Output]:
         computed, measured = self.signal("computed"), self.signal("deflection")
         command, force = self.commanded(), self.pulled()
-        others = {name: smoothed(signal) for name, signal in self.others().items()}
-        rng = np.random.default_rng(47)
+        others, rng = self.others(), np.random.default_rng(47)
         noise = Nodes(command.passed(rng)), force.passed(rng)
 
         def driven(c: Floats, f: Floats, otherwise: bool = False) -> Predict:
@@ -361,7 +360,8 @@ class Reader(Reading):
         points = None if self.rig.flight is None else self.surface_points(self.rig, self.control)
         if points is None:
             return []
-        estimate, measured = asked_of(self.record, self.control), self.record[self.surface]
+        surface, estimate = surface_channel(self.control), asked_of(self.record, self.control)
+        measured = self.record[surface]
         trim = trim_of(self.rig, self.record, self.control)
         filed = filed_trim(self.rig, self.control)
         held = 0.0 if trim is None else about(trim.position, filed, points)
@@ -378,7 +378,7 @@ class Reader(Reading):
         left = measured - predict(self.rig)
         own = left_noise(estimate_noise(left), measured, left)
         floor = float(np.hypot(own.rms, KNOWN * np.ptp(measured)))
-        return [self._output("surface", self.surface, measured, predict, floor)]
+        return [self._output("surface", surface, measured, predict, floor)]
 
 
 def _rms(signal: Floats) -> float:

@@ -35,7 +35,7 @@ from coupled.gap.effects.airframe import term
 from coupled.gap.effects.effect import BY_REGRESSOR, Effect, Parameter, dotted, keys_of
 from coupled.gap.effects.settings import Scales, in_scale
 from coupled.gap.noise.smooth import smoothed
-from coupled.gap.signals.output import Floats, Output, estimate_noise
+from coupled.gap.signals.output import Floats, Output, white
 from coupled.gap.stages.airframe import RATE, needs
 from coupled.gap.stages.openloop import fly_open_loop
 from coupled.gap.stages.stages import Reader
@@ -70,20 +70,23 @@ def tried_effects(
     library: Sequence[Effect], readers: Sequence[Reader], outputs: Sequence[Output]
 ) -> list[Effect]:
     """Return the effects that records let be tried, with the outputs in which they show."""
-    records, control = [reader.record for reader in readers], readers[0].control
-    known = [effect for effect in library if effect.can_be_tried(records, control)]
-    known = _of_aircraft(known, readers[0].rig, records)
-    if not has_arc(readers[0].rig, control):
-        known = [one for one in known if all(p.key != ARC for p in one.parameters)]
+    records = [reader.record for reader in readers]
+    rig, control = readers[0].rig, readers[0].control
+    scales, excluded = Scales.of(readers), lacking_keys(rig)
+    if not has_arc(rig, control):
+        excluded.add(ARC)
+    if not _turns_far(readers):
+        excluded.add(GRAVITY)
+    if scales is None or scales.regressor == 0.0:  # none, or as constant as an offset
+        excluded.update(BY_REGRESSOR)
+    known = [one for one in library if one.can_be_tried(records, control)]
+    known = [one for one in known if excluded.isdisjoint(keys_of([one]))]
+    if rig.flight is not None:
+        still = {name for name in LATERAL if not any(_moves(name, record) for record in records)}
+        known = [one for one in known if one.stage != "airframe" or still.isdisjoint(one.needs)]
     if not (readers[0].moved and readers[0].imposed == "computed"):
         known = [one for one in known if [p.key for p in one.parameters] != [CONTACT]]
-    known = as_judged(known, readers, outputs)
-    if not _turns_far(readers):
-        known = [one for one in known if all(p.key != GRAVITY for p in one.parameters)]
-    scales = Scales.of(readers)
-    if scales is None or scales.regressor == 0.0:  # none, or as constant as an offset
-        known = [one for one in known if not keys_of([one]) & {*BY_REGRESSOR}]
-    known = in_scale(known, scales, readers[0].rig, control)
+    known = in_scale(as_judged(known, readers, outputs), scales, rig, control)
     if readers[0].set_points:
         known = _under_set_points(known, records, control)
     judged = {output.stage for output in outputs}
@@ -120,20 +123,6 @@ def _turns_far(readers: Sequence[Reader]) -> bool:
     return False
 
 
-def _of_aircraft(effects: Sequence[Effect], rig: Rig, records: Sequence[Record]) -> list[Effect]:
-    """Return effects without those whose part the model lacks, or whose lateral motion is noise."""
-    if rig.flight is None:
-        return list(effects)
-    lacking = lacking_keys(rig)
-    still = {name for name in LATERAL if not any(_moves(name, record) for record in records)}
-    return [
-        effect
-        for effect in effects
-        if effect.stage != "airframe"
-        or not (lacking & {p.key for p in effect.parameters} or still & {*effect.needs})
-    ]
-
-
 def lacking_keys(rig: Rig) -> set[str]:
     """Return the keys of the factors on parts that a rig's model lacks."""
     if rig.flight is None:
@@ -144,10 +133,7 @@ def lacking_keys(rig: Rig) -> set[str]:
 
 def _moves(name: str, record: Record) -> bool:
     """Tell whether a channel shows more than noise."""
-    if name not in record:
-        return False
-    noise = estimate_noise(record[name]).rms
-    return float(np.std(record[name])) > MORE * noise
+    return name in record and float(np.std(record[name])) > MORE * white(record[name])
 
 
 def as_judged(
@@ -273,7 +259,7 @@ def _reached(grip: Floats, record: Record) -> float:
     A play only makes it slower than the servo; a bend would add to it, but is not considered.
     """
     rate_Hz = (len(grip) - 1) / float(record.time_s[-1] - record.time_s[0])
-    noise = 2.0 * SIGMAS * estimate_noise(grip).rms  # of the two ends of a way
+    noise = 2.0 * SIGMAS * white(grip)  # of the two ends of a way
     over = [n for n in REACHED_OVER if n < len(grip)]
     way = [float(np.max(np.abs(grip[n:] - grip[:-n]))) - noise for n in over]
     return max([rate_Hz * w / n for n, w in zip(over, way, strict=True)], default=0.0)
@@ -288,11 +274,8 @@ def with_terms(library: Sequence[Effect], rig: Rig, records: Mapping[str, Record
     assert rig.flight is not None
     axes = functions_of(main_file(rig.flight, [aircraft_folder()], rig.name))
     if not axes:
-        raise InputError(
-            rig.name,
-            TERMS_OPTION,
-            f"{rig.flight.model} has no named aerodynamic functions; leave it out",
-        )
+        problem = f"{rig.flight.model} has no named aerodynamic functions; leave it out"
+        raise InputError(rig.name, TERMS_OPTION, problem)
     large = set[str]()
     for file, record in records.items():
         lacking = [name for name in needs(rig, record) if name not in record]
@@ -300,7 +283,7 @@ def with_terms(library: Sequence[Effect], rig: Rig, records: Mapping[str, Record
             problem = f"the record lacks {', '.join(lacking)}, which the airframe needs"
             raise InputError(file, TERMS_OPTION, problem)
         large |= large_terms(rig, record, axes)
-    kept = [one for one in library if not _AERODYNAMIC & {p.key for p in one.parameters}]
+    kept = [one for one in library if not _AERODYNAMIC & keys_of([one])]
     return [*kept, *(term(name, axis) for name, axis in axes.items() if name in large)]
 
 
