@@ -11,8 +11,7 @@ would hide whether the product is digital.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,104 +21,85 @@ from coupled.gap.noise.smooth import Smoother, smoothed
 from coupled.gap.signals.floors import unsmoothed, with_error
 from coupled.gap.signals.output import Floats, Predict
 from coupled.gap.signals.reading import Reading
+from coupled.gap.stages.inputs import Noisy
 from coupled.gap.thresholds import FAR_SIGMAS, ROUNDING_SPAN
-from coupled.rig.hosted import Feel, held_over
+from coupled.rig.hosted import held_over
 from coupled.rig.replay import replay_compensation, replay_product
 from coupled.rig.rig import Rig
 
 
-@dataclass(frozen=True)
-class Product:
-    """F_mod of a record in N, from δc and G_T; each signal of shape (frames,)."""
+class Product(NamedTuple):
+    """F_mod of a record in N, from δc and G_T; each signal of shape (frames,).
 
-    reading: Reading
+    predict     the product of a rig
+    noisy       the nominal product, with a numbered sample of the noise of δc
+    own         the noise of the channel, from its spectrum
+    judged      the frames in which noise of δc does not decide the sign of a jump of F_mod
+    correlated  the noise in the product of δc as read that comes from that reading
+    """
 
-    @cached_property
-    def own(self) -> Noise:
-        """The noise of the channel, from its spectrum."""
-        return self.reading.channel_noise("modifying_force")
+    predict: Predict
+    noisy: Noisy
+    own: Noise
+    judged: NDArray[np.bool_]
+    correlated: Floats
 
-    @cached_property
-    def unsure(self) -> NDArray[np.bool_]:
-        """The frames in which noise of δc decides the sign of a jump of F_mod at the breakout.
 
-        They include the rows of a live record in which the loader is not judged. The prediction
-        there is the measurement. A jump below the noise of F_mod counts too, if it exceeds the
-        rise of the gradient: δc as read has the right sign more often than δc smoothed, for both
-        kinds of product.
-        """
-        away, level = self._smooth - self._neutral, self._level.rms
-        below, above, beyond = (self._made(self._neutral + k * level) for k in (-1.0, 1.0, 3.0))
-        jump, rise = np.abs(above - below), np.abs(beyond - above)
-        near = np.abs(away) < FAR_SIGMAS * level
-        jumps = near & ((jump > FAR_SIGMAS * self.own.rms) | (jump > 2.0 * rise))
-        judged = self.reading.judged
-        return np.asarray(jumps if judged is None else jumps | ~judged)
+def multiplied(reading: Reading) -> Product:
+    """Return the product of δc and the modifying gradient, as a record has it.
 
-    @cached_property
-    def correlated(self) -> Floats:
-        """The noise in the product of δc as read that comes from that reading, N."""
-        more = self._made(self._computed) - self._made(self._smooth)
-        return np.where(self.unsure, 0.0, more)
+    At the breakout the product jumps. Frames in which noise of δc decides the sign of a jump are
+    not judged: the prediction there is the measurement. A jump below the noise of F_mod counts too,
+    if it exceeds the rise of the gradient: δc as read has the right sign more often than δc
+    smoothed, for both kinds of product. Nor are the rows of a live record in which the loader is
+    not judged.
+    """
+    recorded, computed = reading.signal("modifying_force"), reading.as_read("computed")
+    own, level = reading.channel_noise("modifying_force"), reading.channel_noise("computed")
+    smooth, feel, control = smoothed(computed), reading.feel(), reading.control
+    neutral = 0.0 * smooth + reading.neutral()
 
-    def predict(self, rig: Rig, seen: Floats | None = None) -> Floats:
-        """Return a rig's product of δc, smoothed or as `seen` in d, N."""
-        of = self.reading
-        if rig.controls[of.control].loader.multiplier == "digital":
-            read = self._computed
-        else:
-            sensed, smooth = of.sensed(rig), self._likely if seen is None else seen
-            still = smooth - sensed.hum(self._computed)
-            read = sensed.curve.inverse(still / sensed.scale(len(smooth)))
-        return np.where(self.unsure, of.signal("modifying_force"), self._made(read, rig))
-
-    def noisy(self, rig: Rig, k: int) -> Floats:
-        """Return the product with the k-th sample of the noise of δc."""
-        return self.predict(rig, with_error(self._likely, k, self._level))
-
-    @cached_property
-    def _computed(self) -> Floats:
-        return self.reading.as_read("computed")
-
-    @cached_property
-    def _smooth(self) -> Floats:
-        return smoothed(self._computed)
-
-    @cached_property
-    def _likely(self) -> Floats:
-        """The estimate of δc, d: smoothed, plus the motion's share of what the smoother removes.
-
-        For a fast motion with little noise that share is large. Without it, an analog product,
-        which contains the whole motion, would seem to repeat the noise of δc.
-        """
-        rest = self._computed - self._smooth
-        noise = self._level.sample(len(rest), np.random.default_rng(53))
-        alone = noise - Smoother.of(self._computed).passed(noise)
-        power = float(rest @ rest)
-        motion = max(0.0, 1.0 - float(alone @ alone) / power) if power > 0.0 else 0.0
-        return self._smooth + motion * rest
-
-    @cached_property
-    def _level(self) -> Noise:
-        return self.reading.channel_noise("computed")
-
-    @cached_property
-    def _feel(self) -> Feel:
-        return self.reading.feel()
-
-    @cached_property
-    def _neutral(self) -> Floats:
-        """The δc of neutral with the services, d."""
-        return 0.0 * self._smooth + self.reading.neutral()
-
-    def _made(self, read: Floats, rig: Rig | None = None) -> Floats:
-        """Return the product of δc as read, N, by a rig; default: the nominal one."""
-        of = self.reading
-        rig = of.rig if rig is None else rig
-        missed, assumed = of.missed.under(rig, of.control), of.assumed()
+    def made(read: Floats, rig: Rig = reading.rig) -> Floats:
+        """Return the product of δc as read, N."""
+        missed, assumed = reading.missed.under(rig, control), reading.assumed()
         more = None if assumed is None else assumed.gradient
-        place = read - self._neutral
-        return replay_product(rig, of.control, place, self._feel, missed, more)
+        return replay_product(rig, control, read - neutral, feel, missed, more)
+
+    below, above, beyond = (made(neutral + k * level.rms) for k in (-1.0, 1.0, 3.0))
+    jump, rise = np.abs(above - below), np.abs(beyond - above)
+    near = np.abs(smooth - neutral) < FAR_SIGMAS * level.rms
+    judged = ~(near & ((jump > FAR_SIGMAS * own.rms) | (jump > 2.0 * rise)))
+    if reading.judged is not None:
+        judged &= reading.judged
+    likely = _with_motion(computed, smooth, level)
+
+    def predict(rig: Rig, seen: Floats = likely) -> Floats:
+        read = computed
+        if rig.controls[control].loader.multiplier != "digital":
+            sensed = reading.sensed(rig)
+            still = seen - sensed.hum(computed)
+            read = sensed.curve.inverse(still / sensed.scale(len(seen)))
+        return np.where(judged, made(read, rig), recorded)
+
+    def noisy(rig: Rig, k: int) -> Floats:
+        return predict(rig, with_error(likely, k, level))
+
+    correlated = np.where(judged, made(computed) - made(smooth), 0.0)
+    return Product(predict, noisy, own, judged, correlated)
+
+
+def _with_motion(computed: Floats, smooth: Floats, level: Noise) -> Floats:
+    """Return the estimate of δc, d: smoothed, plus the motion's share of what the smoother removes.
+
+    For a fast motion with little noise that share is large. Without it, an analog product, which
+    contains the whole motion, would seem to repeat the noise of δc.
+    """
+    rest = computed - smooth
+    noise = level.sample(len(rest), np.random.default_rng(53))
+    alone = noise - Smoother.of(computed).passed(noise)
+    power = float(rest @ rest)
+    motion = max(0.0, 1.0 - float(alone @ alone) / power) if power > 0.0 else 0.0
+    return smooth + motion * rest
 
 
 def compensated(reading: Reading) -> tuple[Predict, float, float]:

@@ -60,6 +60,7 @@ from coupled.rig.rig import Rig
 
 RATCHET = 1.0 / (2.0**0.5 - 1.0)  # noise of √2 times the size causes √2 times the creep
 Driven = Callable[[Rig, float], Floats]  # response of a rig with a multiple of a noise sample
+Noisy = Callable[[Rig, int], Floats]  # prediction by a rig with a numbered error of its input
 
 
 def without_backlash_creep(rig: Rig, control: ControlName, at: Driven, measured: Floats) -> Floats:
@@ -116,41 +117,32 @@ def _without_creep(rig: Rig, at: Driven, measured: Floats, times: float = 1.0) -
     return plain + min(max((much - worse) / (much - some), 0.0), 1.0) * push
 
 
-class Imposed:
-    """The force under an imposed motion: as measured, and as predicted by a rig."""
+def under_motion(reading: Reading) -> tuple[Predict, Noisy]:
+    """Return the prediction of the force as read, N, under an imposed motion.
 
-    def __init__(self, reading: Reading) -> None:
-        self._reading = reading
-        self._motion = smoothed(reading.signal(reading.imposed))
-        self._level: Noise = reading.driving(reading.imposed)
-        self._feel = reading.feel()
-        self._inputs = reading.other_inputs()
-        self._force = reading.pulled()
-        self._others = reading.others()
+    And that with a numbered sample of the error of the smoothed motion.
+    """
+    control, inputs, others = reading.control, reading.other_inputs(), reading.others()
+    feel, force, measured = reading.feel(), reading.pulled(), reading.signal("force")
+    motion, level = smoothed(reading.signal(reading.imposed)), reading.driving(reading.imposed)
 
-    def predict(self, motion: Floats | None = None, force: Floats | None = None) -> Predict:
-        """Return the prediction for a motion as read, d at each frame; default: the record's.
-
-        `force`, N, bends the structure behind the grip; default: the record's.
-        """
-        reading = self._reading
-        moved = self._motion if motion is None else motion
-        pulled = self._force.smooth if force is None else force
-        imposed = Nodes(moved)
+    def moved_by(motion: Floats, pulled: Floats) -> Predict:
+        """Return the prediction for a motion as read, d, and F, N, which bends the structure."""
+        imposed = Nodes(motion)
 
         def at_loader(rig: Rig) -> Floats:
             read_as = reading.sensed(rig)
             if reading.imposed == "deflection":
                 bending = read_as.force(pulled)
-                grip = read_as.from_grip(moved, bending)
-                return behind_linkage(rig, reading.control, grip, bending, self._others)
+                grip = read_as.from_grip(motion, bending)
+                return behind_linkage(rig, control, grip, bending, others)
             nodes = imposed.of(rig)
             scaled = nodes / read_as.scale(len(nodes), rig.substeps)
             return read_as.curve.inverse(np.asarray(scaled))
 
         def predicted(rig: Rig) -> Floats:
-            data, true = rig.controls[reading.control], at_loader(rig)
-            answer = answer_to(rig, reading.control, true, self._feel, self._inputs(rig))
+            data = rig.controls[control]
+            answer = answer_to(rig, control, at_loader(rig), feel, inputs(rig))
             late_s = data.sensing.force_stamp - data.loader.delay
 
             def read(force: Floats) -> Floats:
@@ -158,120 +150,103 @@ class Imposed:
                 gauged = data.sensing.force_scale * shown + data.sensing.force_zero
                 return stamped(gauged, late_s * rig.frame_rate)
 
-            force = read(answer.force)
+            made = read(answer.force)
             if (answer.most > answer.least).any():
-                force = self._within_rests(force, read(answer.least), read(answer.most))
-            return self._within_jumps(force, answer.jumps) if answer.jumps.any() else force
+                made = _within_rests(made, force.smooth, read(answer.least), read(answer.most))
+            return _within_jumps(made, measured, answer.jumps) if answer.jumps.any() else made
 
         return predicted
 
-    def _within_rests(self, predicted: Floats, least: Floats, most: Floats) -> Floats:
-        """Return a prediction that at rest is the force measured, if friction can hold it.
+    def noisy(rig: Rig, k: int) -> Floats:
+        return moved_by(with_error(motion, k, level), force.with_error(k + TRIES))(rig)
 
-        Beyond its noise: what friction cannot hold is a misfit.
-        """
-        held = np.clip(self._force.smooth, np.minimum(least, most), np.maximum(least, most))
-        return np.where(most != least, held, predicted)
-
-    def _within_jumps(self, predicted: Floats, jumps: NDArray[np.bool_]) -> Floats:
-        """Return a prediction with a small weight where the force jumps within a frame.
-
-        A backlash that closes within a frame gives a sample between the forces before and after.
-        Only the share `LESSER` of the difference counts, which still guides a fit.
-        """
-        around = np.stack((np.roll(predicted, 1), np.roll(predicted, -1)))
-        held = np.clip(self._reading.signal("force"), around.min(axis=0), around.max(axis=0))
-        return np.where(jumps, held + LESSER * (predicted - held), predicted)
-
-    def noisy(self, rig: Rig, k: int) -> Floats:
-        """Return the prediction with a sample of the error of the smoothed motion."""
-        moved = with_error(self._motion, k, self._level)
-        return self.predict(moved, self._force.with_error(k + TRIES))(rig)
+    return moved_by(motion, force.smooth), noisy
 
 
-class Series:
-    """The motion of the grip under a force, as measured and as predicted by a rig."""
+def _within_rests(predicted: Floats, measured: Floats, least: Floats, most: Floats) -> Floats:
+    """Return a prediction that at rest is the force measured, if friction can hold it.
 
-    def __init__(self, reading: Reading, force: Drive, hosted: Hosted) -> None:
-        self._reading, self.force, self._hosted = reading, force, hosted
-        self._feel = reading.feel()
-        self._inputs = reading.other_inputs()
-        self._grip = smoothed(reading.signal("deflection"))
-        self._others = reading.others()
-        self._leaks = [Nodes(smoothed(other)) for other in reading.partner()]
-        self._trembling = force.passed(np.random.default_rng(47))
-        self._trembling_nodes = Nodes(self._trembling)
-        self._walks: bool | None = None
+    Beyond its noise: what friction cannot hold is a misfit.
+    """
+    held = np.clip(measured, np.minimum(least, most), np.maximum(least, most))
+    return np.where(most != least, held, predicted)
 
-    def _driven(self, force: Floats) -> Driven:
-        """Return the response to a force, N at the frames, plus a multiple of its noise."""
-        reading, nodes = self._reading, Nodes(force, self.force.on_nodes)
 
-        def at(rig: Rig, times: float) -> Floats:
-            sensed = reading.sensed(rig)
-            pull = sensed.force_on_nodes(nodes.of(rig), force)
-            bending = sensed.force(force)
-            if times:
-                pull = pull + times * self._trembling_nodes.of(rig)
-                bending = bending + times * self._trembling
-            if self._leaks and (share := rig.controls[reading.control].loader.crosstalk):
-                pull = pull + share * self._leaks[0].of(rig)
-            host = self._hosted._replace(missed=reading.missed.under(rig, reading.control))
-            driven_by = (pull, self._feel, bending, self._inputs(rig))
-            begun = self._begun(rig, bending)
-            read = drive_series(rig, reading.control, *driven_by, host, self._others, begun)
-            return sensed.at_grip(read, bending)
+def _within_jumps(predicted: Floats, measured: Floats, jumps: NDArray[np.bool_]) -> Floats:
+    """Return a prediction with a small weight where the force jumps within a frame.
 
-        def taken_up(rig: Rig, times: float) -> Floats:
-            loader = rig.controls[reading.control].loader
-            if loader.play == 0.0 or loader.play_stiffness > 0.0:
-                return at(rig, times)
-            key = f"controls.{reading.control}.loader.play_{unit_of(reading.control)}"
-            held, half = at(rig.changed({key: 0.0}), times), 0.5 * loader.play
-            true = reading.sensed(rig).force(force)
-            free = np.clip(reading.signal("deflection"), held - half, held + half)
-            acts = np.abs(true) > SIGMAS * self.force.noise.rms
-            return np.where(acts, held + half * np.sign(true), free)
+    A backlash that closes within a frame gives a sample between the forces before and after. Only
+    the share `LESSER` of the difference counts, which still guides a fit.
+    """
+    around = np.stack((np.roll(predicted, 1), np.roll(predicted, -1)))
+    held = np.clip(measured, around.min(axis=0), around.max(axis=0))
+    return np.where(jumps, held + LESSER * (predicted - held), predicted)
 
-        return taken_up if reading.by_hand else at
 
-    def _begun(self, rig: Rig, bending: Floats) -> Restart | None:
+def in_series(reading: Reading, force: Drive, hosted: Hosted, own: Noise) -> tuple[Predict, Noisy]:
+    """Return the prediction of δ as read, d, under a force; `own` is the noise of δ.
+
+    And that with a numbered sample of the error of the smoothed force.
+    """
+    control, inputs, others = reading.control, reading.other_inputs(), reading.others()
+    feel, measured = reading.feel(), reading.signal("deflection")
+    smooth_grip = smoothed(measured)
+    leaks = [Nodes(smoothed(other)) for other in reading.partner()]
+    trembling = force.passed(np.random.default_rng(47))
+    trembling_nodes = Nodes(trembling)
+
+    def begun(rig: Rig, bending: Floats) -> Restart | None:
         """Return the measured start of the loader, if the record does not begin at rest.
 
         A grip moved by a bench begins anywhere within the play, so its start is not known.
         """
-        reading = self._reading
         if not reading.begins_moved or reading.by_hand:
             return None
-        bend = rig.controls[reading.control].loader.bend
-        place = reading.sensed(rig).from_grip(self._grip, bending) - bend * bending
+        bend = rig.controls[control].loader.bend
+        place = reading.sensed(rig).from_grip(smooth_grip, bending) - bend * bending
         return np.arange(len(place)) == 0, place, rate_of(place, rig.frame_rate)
 
-    def _predicted(self, force: Floats, times: float) -> Predict:
-        reading, at = self._reading, self._driven(force)
-        measured = reading.signal("deflection")
+    def driven(pulled: Floats) -> Driven:
+        """Return the response to a force, N at the frames, plus a multiple of its noise."""
+        nodes = Nodes(pulled, force.on_nodes)
 
-        def predicted(rig: Rig) -> Floats:
-            loader = rig.controls[reading.control].loader
-            ratchets = loader.play > 0.0 and not reading.by_hand
-            if ratchets or loader.bend_hysteresis_share:
-                return without_backlash_creep(rig, reading.control, at, measured)
-            if self._walks:
-                return without_friction_creep(rig, reading.control, at, measured, times)
-            return at(rig, 0.0)
+        def at(rig: Rig, times: float) -> Floats:
+            sensed = reading.sensed(rig)
+            pull, bending = sensed.force_on_nodes(nodes.of(rig), pulled), sensed.force(pulled)
+            if times:
+                pull = pull + times * trembling_nodes.of(rig)
+                bending = bending + times * trembling
+            if leaks and (share := rig.controls[control].loader.crosstalk):
+                pull = pull + share * leaks[0].of(rig)
+            host = hosted._replace(missed=reading.missed.under(rig, control))
+            driven_by = (pull, feel, bending, inputs(rig), host, others, begun(rig, bending))
+            return sensed.at_grip(drive_series(rig, control, *driven_by), bending)
 
-        return predicted
+        def taken_up(rig: Rig, times: float) -> Floats:
+            loader = rig.controls[control].loader
+            if loader.play == 0.0 or loader.play_stiffness > 0.0:
+                return at(rig, times)
+            key = f"controls.{control}.loader.play_{unit_of(control)}"
+            held, half = at(rig.changed({key: 0.0}), times), 0.5 * loader.play
+            true = reading.sensed(rig).force(pulled)
+            free = np.clip(measured, held - half, held + half)
+            acts = np.abs(true) > SIGMAS * force.noise.rms
+            return np.where(acts, held + half * np.sign(true), free)
 
-    def predict(self, own: Noise) -> Predict:
-        """Return the prediction of δ as read, in d at each frame; `own` is the noise of δ."""
-        force = self.force
-        if self._walks is None:
-            answer = self._driven(force.smooth)
-            walks = force.smooth is not force.recorded
-            reading = self._reading
-            self._walks = walks and creeps(reading.rig, reading.control, answer, own.rms)
-        return self._predicted(force.smooth, 1.0)
+        return taken_up if reading.by_hand else at
 
-    def noisy(self, rig: Rig, k: int) -> Floats:
-        """Return the prediction with sample number k of the error of the smoothed force."""
-        return self._predicted(self.force.with_error(k), 2.0**0.5)(rig)
+    def predicted(at: Driven, rig: Rig, times: float = 1.0) -> Floats:
+        loader = rig.controls[control].loader
+        if (loader.play > 0.0 and not reading.by_hand) or loader.bend_hysteresis_share:
+            return without_backlash_creep(rig, control, at, measured)
+        if walks:
+            return without_friction_creep(rig, control, at, measured, times)
+        return at(rig, 0.0)
+
+    def noisy(rig: Rig, k: int) -> Floats:
+        return predicted(driven(force.with_error(k)), rig, 2.0**0.5)
+
+    answer = driven(force.smooth)
+    walks = force.smooth is not force.recorded
+    walks = walks and creeps(reading.rig, control, answer, own.rms)
+    return partial(predicted, answer), noisy

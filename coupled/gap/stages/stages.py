@@ -38,12 +38,13 @@ from coupled.gap.signals.floors import (
 from coupled.gap.signals.live import Mask
 from coupled.gap.signals.output import Floats, HiddenGap, Output, Predict, estimate_noise, spread
 from coupled.gap.signals.reading import Reading, drifts
-from coupled.gap.stages.host import Product, compensated
+from coupled.gap.stages.host import compensated, multiplied
 from coupled.gap.stages.inputs import (
     Driven,
-    Imposed,
-    Series,
+    Noisy,
     creeps,
+    in_series,
+    under_motion,
     without_backlash_creep,
     without_friction_creep,
 )
@@ -116,7 +117,7 @@ class Reader(Reading):
         stage: str,
         quantity: str,
         predict: Predict,
-        noisy: Callable[[Rig, int], Floats],
+        noisy: Noisy,
         own: Noise,
         driven_by: str = "",
         between: float = 0.0,
@@ -295,12 +296,12 @@ class Reader(Reading):
         """Return the grip's motion under the force, for records without δc."""
         grip = self.signal("deflection")
         force = self._without_answered_noise(self.pulled(), grip)
-        series = Series(self, force, hosted_by(self))
         own = self.channel_noise("deflection")
-        predict = self._judged(series.predict(own), grip)
+        seen, shaken = in_series(self, force, hosted_by(self), own)
+        predict = self._judged(seen, grip)
 
         def noisy(rig: Rig, k: int) -> Floats:
-            return self._judged(partial(series.noisy, k=k), grip)(rig)
+            return self._judged(partial(shaken, k=k), grip)(rig)
 
         given = (predict, noisy, own, "force")
         found = self._made("loader", "deflection", *given, judged=self.judged)
@@ -308,15 +309,15 @@ class Reader(Reading):
 
     def _answering(self) -> list[Output]:
         """Return the force as the output under an imposed motion."""
-        motion, force = Imposed(self), self.signal("force")
+        force, (predict, noisy) = self.signal("force"), under_motion(self)
         own = min(self.driving("force"), between_jumps(force), key=lambda one: one.rms)  # backlash
-        return [self._made("loader", "force", motion.predict(), motion.noisy, own, self.imposed)]
+        return [self._made("loader", "force", predict, noisy, own, self.imposed)]
 
     def _multiplier(self) -> list[Output]:
-        product = Product(self)
-        made = ("modifying_force", product.predict, product.noisy, product.own)
-        judged, correlated = ~product.unsure, product.correlated
-        return [self._made("multiplier", *made, judged=judged, correlated=correlated)]
+        made = multiplied(self)
+        given = ("modifying_force", made.predict, made.noisy, made.own)
+        seen = {"judged": made.judged, "correlated": made.correlated}
+        return [self._made("multiplier", *given, **seen)]
 
     def _linkage(self) -> list[Output]:
         computed, measured = self.signal("computed"), self.signal("deflection")
