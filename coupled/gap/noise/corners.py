@@ -18,13 +18,7 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d
 
 from coupled.gap.noise.noise import Floats
-from coupled.gap.thresholds import (
-    CORNER_FRAMES,
-    FAR_SIGMAS,
-    PARTLY,
-    ROUNDING_SPAN,
-    SIGMAS,
-)
+from coupled.gap.thresholds import CORNER_FRAMES, FAR_SIGMAS, PARTLY, ROUNDING_SPAN, SIGMAS
 
 
 @dataclass(frozen=True)

@@ -97,17 +97,16 @@ def live_of(record: Record) -> Live | None:
     live = record.manifest.get("live")
     live = live if isinstance(live, Mapping) else {}
     frame_s = float(np.median(np.diff(record.time_s)))
-    settings = _Settings(record, live, frame_s)
+    known, other, assumed = _settings(record, live, frame_s)
     validity = _validity(record, live)
-    if validity is None and not settings.known:
-        return None
     if validity is None:
+        if not known:
+            return None
         validity = np.zeros(len(record))
     sampled = (validity != REPEATED) & (validity != LOST)
     bridged = _short_runs(~sampled, max(1, round(BRIDGED_s / frame_s)))
     clock = _Clock(record, sampled, frame_s)
-    other = settings.other_hardware()
-    if not settings.known:  # a switch of unknown kind
+    if not known:  # a switch of unknown kind
         other |= validity == SWITCHED
     received = sampled | bridged
     judged, starts = _stretches(received & (validity != FADED) & ~other, clock.jumps, frame_s)
@@ -118,7 +117,6 @@ def live_of(record: Record) -> Live | None:
     quiet = max(
         _runs(received, clock.jumps), key=lambda run: run.stop - run.start, default=slice(0)
     )
-    assumed = settings.assumed()
     words = _words(frame_s, sampled, bridged, validity, other, clock, assumed)
     return Live(judged, starts, quiet, signals, assumed, tuple(words))
 
@@ -253,56 +251,38 @@ class _Clock:
         return found
 
 
-class _Settings:
-    """The settings of host and simulated loader at each row, from the manifest.
+def _settings(
+    record: Record, live: Mapping[str, Any], frame_s: float
+) -> tuple[bool, Mask, dict[str, Assumed]]:
+    """Return whether the manifest lists changes of settings, and their effects.
 
-    `known`: the manifest lists changes.
+    These are the rows with other hardware than at the start or with unknown settings, and K̂ in use
+    for each control whose K̂ changed.
     """
-
-    def __init__(self, record: Record, live: Mapping[str, Any], frame_s: float) -> None:
-        self._time = record.time_s
-        events = sorted(_events(live, frame_s), key=lambda event: event[0])
-        self._events = [event for event in events if event[0] <= self._time[-1]]
-        self._first = _first_settings(record)
-        self.known = bool(events)
-
-    def _rows(self, control: str, what: str) -> Floats | None:
-        """Return a setting's value at each row; None if its first value is not known."""
-        first = self._first.get(control, {}).get(what)
-        times, changes = self._changes(control, what)
-        if first is None:
-            return None if changes else np.zeros(len(self._time))
-        values = np.array([first, *changes])
-        return np.asarray(values[np.searchsorted(times, self._time, side="right")])
-
-    def _changes(self, control: str, what: str) -> tuple[list[float], list[float]]:
-        """Return the times of a setting's changes, s, and the new values."""
-        own = [(at, value) for at, of, key, value in self._events if (of, key) == (control, what)]
-        return [at for at, _ in own], [value for _, value in own]
-
-    def other_hardware(self) -> Mask:
-        """Return the rows with other hardware than at the start, or with unknown settings."""
-        found = np.zeros(len(self._time), dtype=bool)
-        for control in CONTROL_NAMES:
-            for what in (*HARDWARE, *HOSTED):
-                rows = self._rows(control, what)
-                if rows is None:  # first value not known
-                    found |= self._time >= min(self._changes(control, what)[0])
-                elif what in HARDWARE:
-                    found |= rows != rows[0]
-        return found
-
-    def assumed(self) -> dict[str, Assumed]:
-        """Return K̂ in use, for each control whose K̂ changed."""
-        found: dict[str, Assumed] = {}
-        for control in CONTROL_NAMES:
-            bend, estimate, gradient = (self._rows(control, what) for what in HOSTED)
-            if bend is None or estimate is None or gradient is None:
-                continue
+    time, first = record.time_s, _first_settings(record)
+    events = sorted(_events(live, frame_s), key=lambda event: event[0])
+    other, assumed = np.zeros(len(record), dtype=bool), dict[str, Assumed]()
+    for control in CONTROL_NAMES:
+        rows = dict[str, Floats]()
+        for what in (*HARDWARE, *HOSTED):
+            own = [
+                (at, value)
+                for at, of, key, value in events
+                if (of, key) == (control, what) and at <= time[-1]
+            ]
+            if control in first:
+                values = np.array([first[control][what], *(value for _, value in own)])
+                rows[what] = values[np.searchsorted([at for at, _ in own], time, side="right")]
+                if what in HARDWARE:
+                    other |= rows[what] != rows[what][0]
+            elif own:  # first value not known
+                other |= time >= own[0][0]
+        if rows:
+            bend, estimate, gradient = (rows[what] for what in HOSTED)
             used = Assumed(*(bend * on - bend[0] * on[0] for on in (estimate, gradient)))
             if used.estimate.any() or used.gradient.any():
-                found[control] = used
-        return found
+                assumed[control] = used
+    return bool(events), other, assumed
 
 
 def _events(live: Mapping[str, Any], frame_s: float) -> Iterator[tuple[float, str, str, float]]:

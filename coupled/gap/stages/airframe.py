@@ -3,8 +3,8 @@
 The measured surface deflections from trim are added to the model's own trim, and the model is
 flown open loop (`openloop`). Rates, angle of attack, sideslip and load factor are compared, since
 errors in them decay within seconds. Speed and pitch attitude integrate every small error, and are
-compared in short segments (`shots`). The elevator position in trim is compared too (`trim`). `air`
-estimates the motion of the air.
+compared in short segments (`shots`). The elevator position in trim is compared too (`surfaces`).
+`air` estimates the motion of the air.
 
 If the aircraft's control laws move a surface, the host's command is the input: it is flown through
 JSBSim's laws, and the surface is an output.
@@ -37,8 +37,8 @@ from coupled.gap.stages.surfaces import (
     moved,
     surface_channel,
     surface_points,
+    trim_of,
 )
-from coupled.gap.stages.trim import trim_of
 from coupled.gap.thresholds import FAR, KNOWN, SHOT_TRIES
 from coupled.parallel import in_threads, in_turn
 from coupled.record.channels import LATERAL, ControlName, channel, motion_channels

@@ -1,7 +1,7 @@
 """The JSBSim model flown open loop from its own trim, driven by the measured surfaces.
 
 An aircraft with another weight, lift or moment trims at other surface positions. The record gives
-its surface positions in trim (`trim`). The surfaces' deflections from there are added to the
+its surface positions in trim (`surfaces`). The surfaces' deflections from there are added to the
 model's own trim, so that the model does not start with a transient from one trim to the other. A
 measured trim has an error, which would act on a model as a constant deflection, and its attitude
 would drift. If the model's own trim is within that error, the record's trim is therefore taken to
@@ -132,7 +132,12 @@ def fly_open_loop(
         if one.points is not None:
             asked[1:-1, i] -= shifts[i]  # a row results from the frame before it
     asked[-1] = asked[-2]
-    asked = asked[1:] if steps == 1 else _between(asked, steps, between_rows)
+    if steps == 1:
+        asked = asked[1:]
+    else:  # at each step after the first row
+        law = PchipInterpolator if between_rows == "pchip" else CubicSpline
+        at = (1.0 + np.arange((len(asked) - 1) * steps)) / steps
+        asked = law(np.arange(len(asked)), asked, axis=0)(at)
     states = {row * steps: state for row, state in (restarts or {}).items()}
     led = [
         _Led(i, airframe.reader(PROPERTIES[one.channel]), one.gain)
@@ -165,20 +170,12 @@ class _Led:
         return self.last
 
 
-def _between(asked: Floats, steps: int, how: Between) -> Floats:
-    """Return the commands at each step after the first row, shape ((rows − 1)·steps, controls)."""
-    rows = np.arange(len(asked))
-    at = (1.0 + np.arange((len(asked) - 1) * steps)) / steps
-    law = PchipInterpolator if how == "pchip" else CubicSpline
-    return np.asarray(law(rows, asked, axis=0)(at))
-
-
 def _motion(
     airframe: JSBSimAirframe,
     asked: Floats,
     channels: Sequence[str],
     restarts: States,
-    led: Sequence[_Led] = (),
+    led: Sequence[_Led],
 ) -> Floats:
     """Return the channels, SI, shape (steps, channels), of a flight with commands about trim.
 

@@ -49,8 +49,7 @@ from coupled.gap.stages.inputs import (
     without_friction_creep,
 )
 from coupled.gap.stages.openloop import about
-from coupled.gap.stages.surfaces import asked_of, filed_trim, surface_channel
-from coupled.gap.stages.trim import trim_of
+from coupled.gap.stages.surfaces import asked_of, filed_trim, surface_channel, trim_of
 from coupled.gap.thresholds import (
     KNOWN,
     MOST,
@@ -316,8 +315,8 @@ class Reader(Reading):
     def _multiplier(self) -> list[Output]:
         made = multiplied(self)
         given = ("modifying_force", made.predict, made.noisy, made.own)
-        seen = {"judged": made.judged, "correlated": made.correlated}
-        return [self._made("multiplier", *given, **seen)]
+        judged, correlated = made.judged, made.correlated
+        return [self._made("multiplier", *given, judged=judged, correlated=correlated)]
 
     def _linkage(self) -> list[Output]:
         computed, measured = self.signal("computed"), self.signal("deflection")
