@@ -47,7 +47,7 @@ from coupled.gap.signals.live import judged_part, live_of
 from coupled.gap.signals.output import Floats, Output, estimate_noise, rounding
 from coupled.gap.signals.reading import drifts, softest_gradient, worth_recording
 from coupled.gap.stages.airframe import Flights, airframe_outputs
-from coupled.gap.stages.shots import not_judged
+from coupled.gap.stages.openloop import not_judged
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points
 from coupled.gap.stages.tried import tried_effects, with_terms

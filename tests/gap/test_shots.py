@@ -16,7 +16,7 @@ from coupled.gap.search.case import Case
 from coupled.gap.search.problem import Problem
 from coupled.gap.signals.output import Output
 from coupled.gap.stages.airframe import airframe_outputs
-from coupled.gap.stages.shots import NEEDS, SLOW
+from coupled.gap.stages.openloop import NEEDS, SLOW
 from coupled.record.channels import motion_channels
 from coupled.record.record import Record
 from coupled.resources import aircraft_folder

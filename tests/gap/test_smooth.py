@@ -11,9 +11,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from coupled.gap.effects.library import BY_NAME
-from coupled.gap.noise.corners import corners_in
 from coupled.gap.noise.noise import Noise
-from coupled.gap.noise.smooth import Smoother, smoothed
+from coupled.gap.noise.smooth import Smoother, corners_in, smoothed
 from coupled.gap.search.case import Case
 from coupled.gap.search.problem import Problem
 from coupled.gap.stages.stages import Reader

@@ -20,8 +20,7 @@ from coupled.gap.search.fit import fit_alone
 from coupled.gap.search.problem import Problem
 from coupled.gap.signals.output import TRIM, Output, white
 from coupled.gap.stages.airframe import airframe_outputs
-from coupled.gap.stages.openloop import Moved, about, command_of, fly_open_loop
-from coupled.gap.stages.shots import SLOW
+from coupled.gap.stages.openloop import SLOW, Moved, about, command_of, fly_open_loop
 from coupled.gap.stages.surfaces import WEIGHED, _constant, own_trim, surface_points, trim_of
 from coupled.record.channels import ELEVATOR
 from coupled.record.record import Record

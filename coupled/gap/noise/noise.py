@@ -93,6 +93,11 @@ class Noise:
     filtered: bool = False
     unsure: float = 0.0
 
+    @property
+    def mean_variance(self) -> float:
+        """The variance of a mean relative to that with white noise."""
+        return (1.0 + self.memory) / (1.0 - self.memory)
+
     def sample(self, frames: int, rng: np.random.Generator) -> Floats:
         """Return a sample, shape (frames,)."""
         white = rng.normal(0.0, self.rms, frames)

@@ -16,8 +16,10 @@ preserves sharp inputs. It assumes white noise, so the spectra are first divided
 noise's colour, and λ is scaled likewise. A line (`lines`), such as mains hum, is not noise: it is
 subtracted before and added again.
 
-So are the corners of a scripted force: a smoother rounds one or rings beside it, and dry friction
-keeps the error of the peak.
+So are the corners of a force that a script or a test stand gives: a smoother rounds one or rings
+beside it, by several times the noise, and dry friction keeps the error of the peak. A corner is a
+change of slope, far above those elsewhere in the signal, that is as large over few frames as over
+many; that of a bend grows with the frames. Two straight lines that meet at it leave noise alone.
 """
 
 from __future__ import annotations
@@ -30,11 +32,20 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
+from scipy.ndimage import maximum_filter1d
 
-from coupled.gap.noise.corners import Corners, corners_in
 from coupled.gap.noise.lines import lines_in
 from coupled.gap.noise.noise import Floats, Noise, noise_of, noise_of_input
-from coupled.gap.thresholds import FEW_FRAMES, PIECE, SIGMAS, SMALL
+from coupled.gap.thresholds import (
+    CORNER_FRAMES,
+    FAR_SIGMAS,
+    FEW_FRAMES,
+    PARTLY,
+    PIECE,
+    ROUNDING_SPAN,
+    SIGMAS,
+    SMALL,
+)
 
 REST_FRAMES = PIECE // 2  # of a window at rest
 
@@ -84,7 +95,7 @@ def rest_of(signal: Floats, noise: Noise) -> Rest:
                 near = np.minimum(frames, frames[::-1]) / FEW_FRAMES
                 share[start:end], level[start:end] = np.minimum(1.0, near), mean
                 ends.append((start, end))
-                errors.append(noise.rms * math.sqrt(_longer(noise) / (end - start)))
+                errors.append(noise.rms * math.sqrt(noise.mean_variance / (end - start)))
     return Rest(share, level, tuple(ends), tuple(errors))
 
 
@@ -94,7 +105,7 @@ def _quiet(signal: Floats, noise: Noise) -> NDArray[np.bool_]:
     windows = np.lib.stride_tricks.sliding_window_view(signal, window)
     first, second = windows[:, :half].mean(axis=1), windows[:, half:].mean(axis=1)
     spread = noise.rms * (1.0 + SIGMAS / math.sqrt(2.0 * window))  # of an estimated rms
-    apart = SIGMAS * noise.rms * math.sqrt(2.0 * _longer(noise) / half)
+    apart = SIGMAS * noise.rms * math.sqrt(2.0 * noise.mean_variance / half)
     still = (windows.std(axis=1) <= spread) & (np.abs(second - first) <= apart)
     begun = np.concatenate((still.astype(int), np.zeros(window, dtype=int)))
     begun[window:] -= still  # each still window covers so many frames
@@ -115,13 +126,88 @@ def _is_level(stretch: Floats, mean: float, noise: Noise) -> bool:
     off = np.array([np.mean(part) - mean for part in parts])
     frames = np.array([len(part) for part in parts])
     freedom = len(parts) - 1
-    square = float(np.sum(off**2 * frames)) / (noise.rms**2 * _longer(noise))
+    square = float(np.sum(off**2 * frames)) / (noise.rms**2 * noise.mean_variance)
     return square <= freedom + SIGMAS * math.sqrt(2.0 * freedom)
 
 
-def _longer(noise: Noise) -> float:
-    """Return the variance of a mean relative to that with white noise."""
-    return (1.0 + noise.memory) / (1.0 - noise.memory)
+@dataclass(frozen=True)
+class Corners:
+    """Changes of slope, each by a size in the signal's unit a frame at a time in frames."""
+
+    each: tuple[tuple[float, float], ...] = ()
+
+    def over(self, frames: Floats) -> Floats:
+        """Return the polygon of the corners, zero before the first, at times in frames."""
+        found = np.zeros(len(frames))
+        for time, size in self.each:
+            found += size * np.maximum(frames - time, 0.0)
+        return found
+
+
+def corners_in(signal: Floats) -> Corners:
+    """Return the corners of a signal, in their order.
+
+    Corners that a few frames show are taken out first, since others may lie beside them. At the end
+    each is fitted again over more frames, up to the next corner, which excludes bends.
+    """
+    frames, corners = np.arange(len(signal), dtype=np.float64), dict[int, tuple[float, float]]()
+    noise = float(np.median(np.abs(np.diff(signal, 2)))) / 0.6745 / math.sqrt(6.0)
+    noise = max(noise, ROUNDING_SPAN * float(np.ptp(signal)))
+    for most in CORNER_FRAMES[1:]:
+        if len(signal) < 4 * most:
+            break
+        rest = signal - Corners(tuple(corners.values())).over(frames)
+        seen = [reach for reach in CORNER_FRAMES if reach <= most]
+        turns = {reach: _turns(rest, reach) for reach in seen}
+        usual = {n: float(np.median(np.abs(turn))) / 0.6745 for n, turn in turns.items()}
+        size = np.abs(turns[most])
+        sharp = (size > FAR_SIGMAS * usual[most]) & (size == maximum_filter1d(size, 2 * most + 1))
+        for reach in seen[:-1]:
+            doubt = 0.0 if reach == seen[-2] else SIGMAS * usual[reach]
+            least = (1.0 - PARTLY) * size - doubt
+            sharp &= turns[reach] * np.sign(turns[most]) >= least
+        for at in (np.flatnonzero(sharp[most:-most]) + most).tolist():
+            apart = all(abs(at - other) >= most for other in corners)
+            found = _corner(rest, at, most, noise) if apart else None
+            if found is not None:
+                corners[at] = found
+    rest, kept = signal - Corners(tuple(corners.values())).over(frames), list[tuple[float, float]]()
+    ends = [0, *sorted(corners), len(signal) - 1]
+    for before, at, after in zip(ends, ends[1:], ends[2:], strict=False):
+        reach = min(at - before, after - at, CORNER_FRAMES[-1])
+        own = rest + Corners((corners[at],)).over(frames)
+        found = _corner(own, at, reach, noise) if reach >= CORNER_FRAMES[2] else None
+        kept += [] if found is None else [found]
+    return Corners(tuple(kept))
+
+
+def _turns(signal: Floats, reach: int) -> Floats:
+    """Return the change of slope at each frame over so many frames to either side, same shape.
+
+    By least squares with a straight line; zero at the ends.
+    """
+    shape = np.abs(np.arange(-reach, reach + 1.0))
+    shape -= shape.mean()
+    found = np.zeros(len(signal))
+    found[reach:-reach] = np.correlate(signal, 2.0 * shape / (shape @ shape), mode="valid")
+    return found
+
+
+def _corner(signal: Floats, at: int, reach: int, noise: float) -> tuple[float, float] | None:
+    """Return time and size of the corner within a frame of the given one; None if it is none."""
+    near, best = np.arange(-reach, reach + 1.0), (np.inf, (0.0, 0.0))
+    window = signal[at - reach : at + reach + 1]
+    line = np.column_stack([np.ones(len(near)), near])
+    for places in ([0], [-1, 0], [0, 1]):
+        given = np.hstack([line, np.maximum(near[:, None] - places, 0.0)])
+        found = np.linalg.lstsq(given, window, rcond=None)[0]
+        left, sizes = float(np.sum((window - given @ found) ** 2)), found[2:]
+        if sizes[0] * sizes[-1] > 0.0 and left < best[0]:
+            size = float(np.sum(sizes))
+            best = left, (at + float(np.dot(places, sizes)) / size, size)
+    freedom = len(near) - 4
+    most = noise**2 * (freedom + FAR_SIGMAS * math.sqrt(2.0 * freedom))  # of χ²
+    return best[1] if best[0] <= most else None
 
 
 _REMEMBERED = 64  # size of the cache of smoothers: the signals of one record, noise included
@@ -153,7 +239,7 @@ class Smoother:
         """Return the best smoother of a signal, with differences of one of these orders.
 
         `noise` gives the colour of the noise; by default it is estimated from the signal. A signal
-        may have corners (`corners`) if it is no motion of a mass.
+        may have corners if it is no motion of a mass.
         """
         whole = np.ascontiguousarray(signal, dtype=np.float64).tobytes()
         return _known(whole, tuple(orders), noise, with_corners)

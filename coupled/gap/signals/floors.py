@@ -13,9 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.gap.noise.corners import Corners
 from coupled.gap.noise.noise import Noise, jumps, quiet_noise
-from coupled.gap.noise.smooth import Rest, Smoother, rest_of
+from coupled.gap.noise.smooth import Corners, Rest, Smoother, rest_of
 from coupled.gap.signals.output import Floats, above_rounding, estimate_noise, rounding
 from coupled.gap.thresholds import FEW_FRAMES, SHORT_FRAMES, SIGMAS, TINY
 from coupled.rig.nodes import coarsely, on_nodes

@@ -3,8 +3,8 @@
 The measured surface deflections from trim are added to the model's own trim, and the model is
 flown open loop (`openloop`). Rates, angle of attack, sideslip and load factor are compared, since
 errors in them decay within seconds. Speed and pitch attitude integrate every small error, and are
-compared in short segments (`shots`). The elevator position in trim is compared too (`surfaces`).
-`air` estimates the motion of the air.
+compared in short segments. The elevator position in trim is compared too (`surfaces`). `air`
+estimates the motion of the air.
 
 If the aircraft's control laws move a surface, the host's command is the input: it is flown through
 JSBSim's laws, and the surface is an output.
@@ -28,8 +28,16 @@ from coupled.gap.noise.smooth import smoothed
 from coupled.gap.signals.air import NEEDS_ACROSS, Air, crossing_air, vertical_air
 from coupled.gap.signals.floors import left_noise
 from coupled.gap.signals.output import TRIM, Output, estimate_noise, lasting, spread, white
-from coupled.gap.stages.openloop import Between, Flown, Moved, fly_open_loop
-from coupled.gap.stages.shots import SLOW, Restarts, States, is_throttled
+from coupled.gap.stages.openloop import (
+    SLOW,
+    Between,
+    Flown,
+    Moved,
+    Restarts,
+    States,
+    fly_open_loop,
+    is_throttled,
+)
 from coupled.gap.stages.surfaces import (
     Trim,
     flown_by,

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.gap.noise.noise import Noise, between_jumps
-from coupled.gap.noise.smooth import rate_of, smoothed
+from coupled.gap.noise.smooth import Smoother, rate_of, smoothed
 from coupled.gap.signals.conditions import reach_of, trim_shift
 from coupled.gap.signals.floors import (
     Drive,
@@ -33,12 +33,12 @@ from coupled.gap.signals.floors import (
     remove_projection,
     share_from_source,
     share_in_response,
+    unsmoothed,
     with_error,
 )
 from coupled.gap.signals.live import Mask
 from coupled.gap.signals.output import Floats, HiddenGap, Output, Predict, estimate_noise, spread
 from coupled.gap.signals.reading import Reading, drifts
-from coupled.gap.stages.host import compensated, multiplied
 from coupled.gap.stages.inputs import (
     Driven,
     Noisy,
@@ -51,6 +51,7 @@ from coupled.gap.stages.inputs import (
 from coupled.gap.stages.openloop import about
 from coupled.gap.stages.surfaces import asked_of, filed_trim, surface_channel, trim_of
 from coupled.gap.thresholds import (
+    FAR_SIGMAS,
     KNOWN,
     MOST,
     NEARLY_ALL,
@@ -63,9 +64,16 @@ from coupled.gap.thresholds import (
     STRETCH_s,
 )
 from coupled.parallel import in_threads
-from coupled.rig.hosted import Hosted
+from coupled.rig.hosted import Hosted, held_over
 from coupled.rig.nodes import Nodes
-from coupled.rig.replay import drive_linkage, drive_loader, replay_schedule, replay_surface
+from coupled.rig.replay import (
+    drive_linkage,
+    drive_loader,
+    replay_compensation,
+    replay_product,
+    replay_schedule,
+    replay_surface,
+)
 from coupled.rig.rig import Rig
 from coupled.rig.serving import held_force
 
@@ -300,7 +308,7 @@ class Reader(Reading):
         predict = self._judged(seen, grip)
 
         def noisy(rig: Rig, k: int) -> Floats:
-            return self._judged(partial(shaken, k=k), grip)(rig)
+            return self._judged(lambda other: shaken(other, k), grip)(rig)
 
         given = (predict, noisy, own, "force")
         found = self._made("loader", "deflection", *given, judged=self.judged)
@@ -313,9 +321,49 @@ class Reader(Reading):
         return [self._made("loader", "force", predict, noisy, own, self.imposed)]
 
     def _multiplier(self) -> list[Output]:
-        made = multiplied(self)
-        given = ("modifying_force", made.predict, made.noisy, made.own)
-        judged, correlated = made.judged, made.correlated
+        """Return F_mod, predicted by the product of δc itself, or of δc as read.
+
+        A digital product contains the sensor noise and scale error of δc, an analog product does
+        not. The part of F_mod that repeats the noise of δc (`correlated`) is therefore not the
+        channel's own noise: included in the noise floor, it would hide whether the product is
+        digital.
+
+        At the breakout the product jumps. Frames in which noise of δc decides the sign of a jump
+        are not judged: the prediction there is the measurement. A jump below the noise of F_mod
+        counts too, if it exceeds the rise of the gradient: δc as read has the right sign more often
+        than δc smoothed, for both kinds of product.
+        """
+        recorded, computed = self.signal("modifying_force"), self.as_read("computed")
+        own, level = self.channel_noise("modifying_force"), self.channel_noise("computed")
+        smooth, feel = smoothed(computed), self.feel()
+        neutral = 0.0 * smooth + self.neutral()
+
+        def product(read: Floats, rig: Rig = self.rig) -> Floats:
+            missed, assumed = self.missed.under(rig, self.control), self.assumed()
+            more = None if assumed is None else assumed.gradient
+            return replay_product(rig, self.control, read - neutral, feel, missed, more)
+
+        below, above, beyond = (product(neutral + k * level.rms) for k in (-1.0, 1.0, 3.0))
+        jump, rise = np.abs(above - below), np.abs(beyond - above)
+        near = np.abs(smooth - neutral) < FAR_SIGMAS * level.rms
+        judged = ~(near & ((jump > FAR_SIGMAS * own.rms) | (jump > 2.0 * rise)))
+        if self.judged is not None:
+            judged &= self.judged
+        likely = _with_motion(computed, smooth, level)
+
+        def predict(rig: Rig, seen: Floats = likely) -> Floats:
+            read = computed
+            if rig.controls[self.control].loader.multiplier != "digital":
+                sensed = self.sensed(rig)
+                still = seen - sensed.hum(computed)
+                read = sensed.curve.inverse(still / sensed.scale(len(seen)))
+            return np.where(judged, product(read, rig), recorded)
+
+        def noisy(rig: Rig, k: int) -> Floats:
+            return predict(rig, with_error(likely, k, level))
+
+        correlated = np.where(judged, product(computed) - product(smooth), 0.0)
+        given = ("modifying_force", predict, noisy, own)
         return [self._made("multiplier", *given, judged=judged, correlated=correlated)]
 
     def _linkage(self) -> list[Output]:
@@ -350,9 +398,31 @@ class Reader(Reading):
         return [replace(linkage, handed_on=None if self.set_points else computed)]
 
     def _compensation(self) -> list[Output]:
-        """Return δ̂, predicted by the host's equations from δc and F as read."""
-        predict, floor, carried = compensated(self)
+        """Return δ̂, predicted by the host's equations from δc and F as read.
+
+        The floor is the noise of δc, although the host reads the same noise, because F may be
+        stamped slightly late. If the rig's F is late, the record's noise of F may differ from the
+        host's.
+        """
+        computed, recorded = self.as_read("computed"), self.as_read("force")
+        others, assumed = self.others(as_read=True), self.assumed()
+
+        def made(rig: Rig, force: Floats) -> Floats:
+            missed = self.missed.under(rig, self.control)
+            made = replay_compensation(rig, self.control, computed, force, others, missed)
+            return made if assumed is None else made + held_over(assumed.estimate * force, missed)
+
+        def predict(rig: Rig) -> Floats:
+            return made(rig, self.sensed(rig).as_the_host_had_it(recorded))
+
+        own = max(self.channel_noise("computed").rms, ROUNDING_SPAN * float(np.ptp(computed)))
+        rig, carried = self.rig, 0.0
+        if rig.controls[self.control].sensing.force_stamp != 0.0:
+            level, late = self.driving("force"), self.sensed(rig).as_the_host_had_it
+            shaken = late(unsmoothed(recorded, 0, level)), unsmoothed(late(recorded), 0, level)
+            carried = math.hypot(*(float(np.std(made(rig, f) - predict(rig))) for f in shaken))
         name, estimate = self.name_of("estimate"), self.signal("estimate")
+        floor = math.hypot(own, carried)
         found = self._output("compensation", name, estimate, predict, floor)
         return [replace(found, smoothed=carried / floor) if floor else found]
 
@@ -384,3 +454,17 @@ class Reader(Reading):
 def _rms(signal: Floats) -> float:
     """Return the root of a signal's mean square."""
     return float(np.sqrt(np.mean(np.square(signal))))
+
+
+def _with_motion(computed: Floats, smooth: Floats, level: Noise) -> Floats:
+    """Return the estimate of δc, d: smoothed, plus the motion's share of what the smoother removes.
+
+    For a fast motion with little noise that share is large. Without it, an analog product, which
+    contains the whole motion, would seem to repeat the noise of δc.
+    """
+    rest = computed - smooth
+    noise = level.sample(len(rest), np.random.default_rng(53))
+    alone = noise - Smoother.of(computed).passed(noise)
+    power = float(rest @ rest)
+    motion = max(0.0, 1.0 - float(alone @ alone) / power) if power > 0.0 else 0.0
+    return smooth + motion * rest

@@ -356,8 +356,7 @@ def _standing_off(
     wanted, measured = asked_of(record, control), record[surface_channel(control)]
     held = about(trim, filed_trim(rig, control), points)
     noise = estimate_noise(measured)
-    crowded = (1.0 + noise.memory) / (1.0 - noise.memory)  # variance of a mean, over white noise's
-    error = noise.rms * math.sqrt(crowded)
+    error = noise.rms * math.sqrt(noise.mean_variance)
     found = 0.0, math.inf
     for time_s in STANDING_s:
         rows = max(2, round(time_s * rig.frame_rate))
