@@ -34,6 +34,7 @@ from coupled.gap.thresholds import (
     REVERSED,
     SHORT_FRAMES,
     SHORT_SWINGS,
+    SMALL,
     TINY,
     OTHER_ALTITUDE_m,
     SHORTEST_RECORD_s,
@@ -49,6 +50,7 @@ from coupled.record.channels import (
     motion_channels,
 )
 from coupled.record.importing import plausible
+from coupled.record.importing.account import log_rate_of
 from coupled.record.record import Record
 from coupled.record.samples import FINER, check_samples, sampling_rate_of
 from coupled.resources import aircraft_folder
@@ -186,13 +188,26 @@ def check_against_model(outputs: Sequence[Output], rig: Rig, files: Sequence[obj
             raise InputError(files[output.record], output.channel, problem)
 
 
-def clipped(record: Record, control: ControlName, file: str) -> list[str]:
-    """Return a sentence for each sensor of a control that stays at its largest reading."""
-    return [
-        f"{name} of {file} is clipped at {end:.4g}; no effect explains what is lost beyond."
-        for name, signal in _signals(record, control).items()
-        if (end := plausible.clipped_at(signal)) is not None
-    ]
+def spoiled(record: Record, control: ControlName, file: str) -> list[str]:
+    """Return a sentence on each sensor of a control that is clipped or repeats its readings.
+
+    One more tells that the import has interpolated the log's rows.
+    """
+    said = []
+    for name, signal in _signals(record, control).items():
+        if (end := plausible.clipped_at(signal)) is not None:
+            said.append(
+                f"{name} of {file} is clipped at {end:.4g}; no effect explains what is lost beyond."
+            )
+        if repeats := plausible.held(signal):
+            said.append(f"{name} of {file} {repeats}: an effect here may be the recorder's.")
+    log_Hz = log_rate_of(record)
+    if log_Hz is not None and log_Hz < (1.0 - SMALL) * sampling_rate_of(record, file):
+        said.append(
+            f"{file} is interpolated between the {log_Hz:.4g} rows a second of its log: its noise "
+            "is unknown, and a small gap may be the interpolation's."
+        )
+    return said
 
 
 def _why_constant(rig: Rig, record: Record, control: ControlName) -> str:

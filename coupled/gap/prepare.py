@@ -34,8 +34,8 @@ from coupled.gap.checks import (
     check_moved_by_pilot,
     check_record,
     check_trim,
-    clipped,
     motion_alone,
+    spoiled,
     trim_speed,
     trimmed,
 )
@@ -127,7 +127,7 @@ def prepare(
     check_against_model(outputs, rig, list(records))
     left_out = [why for one in live for why in one.left_out]
     for file, record in records.items() if part.own else ():
-        left_out += clipped(record, control, file)
+        left_out += spoiled(record, control, file)
     if any(output.stage == AIRFRAME for output in outputs) and (words := not_judged(each)):
         left_out.append(words)
     library = [one for one in library_of(rig, control) if part.frees(keys_of([one]))]

@@ -1,4 +1,4 @@
-"""Sensors with a reversed sign or a clipped range: refused, or named beside the verdict."""
+"""Sensors that are reversed, clipped, held or absent: refused, or named beside the verdict."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+import coupled
 from coupled.errors import InputError
-from coupled.gap.checks import check_record, clipped
+from coupled.gap.checks import check_record, spoiled
 from coupled.gap.diagnose import diagnose
-from coupled.record.importing.plausible import drives_the_hand
+from coupled.record.importing.plausible import drives_the_hand, held
 from coupled.record.record import Record
 from tests.support.gaps import made, nominal_rig
 from tests.support.rigs import bench
@@ -53,11 +54,66 @@ def test_a_reversed_sensor_is_refused_by_name(signs: tuple[int, int, int], name:
 
 def test_a_clipped_sensor_is_named() -> None:
     record = moved(0.2)
-    assert clipped(record, "column", "r.csv") == []
+    assert spoiled(record, "column", "r.csv") == []
     data = record.data.copy()
     data[:, 1] = np.clip(data[:, 1], -10.0, 10.0)
-    [said] = clipped(Record(NAMES, data), "column", "r.csv")
+    [said] = spoiled(Record(NAMES, data), "column", "r.csv")
     assert "column_force_N of r.csv is clipped at 10" in said
+
+
+@pytest.mark.parametrize("rows", [2, 6])
+def test_a_sensor_that_renews_its_value_more_rarely_than_the_rows_is_named(rows: int) -> None:
+    """A grip's transducer on a bus of 20 Hz was a servo lag, without a word on it."""
+    record = moved(1.0)
+    data = record.data.copy()
+    data[:, 3] = data[np.arange(len(data)) // rows * rows, 3]
+    [said] = spoiled(Record(NAMES, data), "column", "r.csv")
+    assert f"column_deflection_m of r.csv holds each value over {rows}" in said
+
+
+@pytest.mark.parametrize("value", [0.0, None])
+def test_a_sensor_that_stands_still_while_the_control_moves_is_named(value: float | None) -> None:
+    data = moved(1.0).data.copy()
+    data[:, 1] += 0.02 * np.random.default_rng(5).standard_normal(len(data))
+    data[510:530, 1] = data[510, 1] if value is None else value
+    [said] = spoiled(Record(NAMES, data), "column", "r.csv")
+    stuck = f"stands still at {data[510, 1]:.4g} over rows 512 to 531"
+    assert f"column_force_N of r.csv {stuck}" in said
+
+
+def test_a_reading_that_repeats_for_another_reason_is_not_named() -> None:
+    rise = np.sin(TIME_s[:157])
+    smooth = np.concatenate([np.zeros(300), rise, np.full(300, rise[-1]), rise[::-1]])
+    noise = np.random.default_rng(1).standard_normal(smooth.size)
+    rest = np.where(np.arange(smooth.size) < 200, 0.3, 0.3 + 0.01 * noise)
+    for signal in (
+        smooth,  # of a simulation without noise
+        np.round(smooth + 0.01 * noise, 2),  # of an encoder
+        np.round(smooth, 2),
+        rest,  # of a sensor whose noise begins with the motion
+        np.clip(smooth + 0.01 * noise, -0.5, 0.5),
+        np.full(100, 3.0),
+    ):
+        assert held(signal) == ""
+
+
+def test_a_log_of_fewer_rows_than_the_record_is_named() -> None:
+    record = moved(1.0)
+    for log_rate_Hz, count in ((50.0, 1), (100.0, 0), (None, 0), ("50", 0)):
+        manifest = {"import": {"clock": {"log_rate_Hz": log_rate_Hz}}}
+        said = spoiled(replace(record, manifest=manifest), "column", "r.csv")
+        assert len(said) == count
+        assert all("interpolated between the 50 rows a second of its log" in one for one in said)
+
+
+def test_a_control_without_channels_is_refused_or_not_called_healthy(flown: Record) -> None:
+    """Its answer was "No gap in the wheel", as if it had been judged."""
+    with pytest.raises(InputError, match=r"r: --control: no stage of the wheel .* wheel_force_N"):
+        diagnose(coupled.load_rig("t37"), {"r": flown}, "wheel")
+    names = [name for name in flown.channels if not name.startswith("column")]
+    bare = Record(tuple(names), np.column_stack([flown[name] for name in names]))
+    found = diagnose(nominal_rig(True), {"r": bare})
+    assert found.summary.startswith("No gap in the airframe: every stage that could be judged")
 
 
 @pytest.fixture(scope="module")

@@ -10,6 +10,7 @@ from dataclasses import replace
 from typing import Any
 
 from coupled.display import System, in_system, split_unit, unit_in
+from coupled.gap.chain import AIRFRAME
 from coupled.gap.effects.airframe import TERM
 from coupled.gap.effects.effect import Switch, dotted
 from coupled.gap.effects.library import BY_NAME
@@ -108,7 +109,8 @@ def _not_judged(found: Findings) -> str:
 
 def _what(found: Findings, floor: str) -> str:
     if found.verdict == "no_gap":
-        return no_gap_in([found.control], floor)
+        own = any(one.judged for one in found.stages if one.name not in (AIRFRAME, "sensing"))
+        return no_gap_in([found.control if own else AIRFRAME], floor)
     hidden = [stage for stage in found.stages if stage.hidden is not None]
     if hidden and not found.guilty:
         why = "; ".join(f"the {stage.name} is not judged, as {stage.why}" for stage in hidden)

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
+from coupled.record.record import Record
+
 
 @dataclass(frozen=True)
 class ClockAccount:
@@ -64,3 +66,11 @@ class ImportAccount:
             "unmapped": list(self.unmapped),
             "warnings": list(self.warnings),
         }
+
+
+def log_rate_of(record: Record) -> float | None:
+    """Return the rows in a second of the log that a record was imported from; None if unknown."""
+    rate: object = record.manifest
+    for key in ("import", "clock", "log_rate_Hz"):
+        rate = rate.get(key) if isinstance(rate, Mapping) else None
+    return rate if isinstance(rate, float) else None

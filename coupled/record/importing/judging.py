@@ -61,6 +61,8 @@ def _by_itself(name: str, values: Floats) -> list[str]:
     clip = plausible.clipped_at(values)
     if clip is not None:
         doubts.append(f"clipped at {clip:.4g}")
+    if repeats := plausible.held(values):
+        doubts.append(repeats)
     step = None if name.endswith("_stop") else plausible.quantised_step(values)
     if step is not None:
         doubts.append(f"quantised, step {step:.3g}")

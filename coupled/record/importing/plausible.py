@@ -6,6 +6,7 @@ to judge: for example, a constant q̄ is normal in a bench record.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -29,8 +30,11 @@ WHOLE_RANGE = 0.9  # of the range: jump of a position that wraps
 # Half and twice of these two change no test of imports and sensors.
 END_OVER_STEP = 20.0  # least jump of a spike in the first or last row, over the step beside it
 LEAST_POWER = 0.05  # correlation of force and rate from which power has a sign
+# Of noise ten times its resolution, 1 of 35 rows repeats by chance, and four in a row in 1 of 10⁶.
+RESOLVED, LONGEST_REPEAT = 10.0, 4
+REGULAR = 0.8  # share of steps that a sensor of a slower rate has at its own period, one row off
+JUMP = 10.0  # standard deviations of noise; two rows of noise differ by half of it in 1 of 2500
 SMALL_STEP = 0.2  # of the range: largest other step of a position from row to row
-_D4 = np.sqrt(70.0)  # fourth differences of white noise: 1, 4, 6, 4, 1 squared and summed
 
 # Bounds of channels of a rig or a transport aircraft in normal flight.
 _BOUNDS: dict[str, tuple[float, float]] = {
@@ -48,14 +52,18 @@ _FASTEST_rad_per_s = 6.0
 _LONGEST_m = 1.0
 
 
-def noise_level(values: Floats) -> float:
+def noise_level(values: Floats, order: int = 4) -> float:
     """Return the standard deviation of a channel's white noise, from its fourth differences.
 
-    The median makes it robust to steps and outliers.
+    The median makes it robust to steps and outliers. Differences of another `order` give the same
+    for white noise, and higher orders less for a motion.
     """
-    if values.size < 5:
+    if values.size <= order:
         return 0.0
-    return float(np.median(np.abs(np.diff(values, 4))) / (0.6745 * _D4))
+    power = math.sqrt(
+        math.comb(2 * order, order)
+    )  # of the binomial coefficients, squared and added
+    return float(np.median(np.abs(np.diff(values, order))) / (0.6745 * power))
 
 
 def is_constant(values: Floats) -> bool:
@@ -95,10 +103,48 @@ def clipped_at(values: Floats) -> float | None:
     return None
 
 
+def held(values: Floats) -> str:
+    """Return how a sensor repeats its value where it should have moved, or nothing.
+
+    It may renew its value every few rows, by steps far above its resolution. Or it stands still in
+    noise that is far above its resolution, and jumps before or after: a sensor at rest does not.
+    Noise is seen if its differences of fourth and sixth order agree. The largest and least values
+    are not judged (`clipped_at`).
+    """
+    change, levels = np.diff(values), np.unique(values)
+    if levels.size < 3:
+        return ""
+    coarse, moved = RESOLVED * float(np.diff(levels).min()), np.flatnonzero(change)
+    spacing = np.diff(moved)
+    every = float(np.median(spacing))
+    regular = float(np.mean(np.abs(spacing - every) <= 1.0)) > REGULAR
+    if every >= 2.0 and regular and float(np.median(np.abs(change[moved]))) > coarse:
+        return f"holds each value over {every:g} rows"
+    noise = noise_level(values)
+    if noise <= max(coarse, ROUNDING * float(np.ptp(values))):
+        return ""
+    if noise_level(values, 6) < 0.5 * noise:
+        return ""
+    still = (change == 0.0) & ~np.isin(values[1:], (values.max(), values.min()))
+    jumps = np.abs(np.concatenate(([0.0], change, [0.0]))) > JUMP * noise
+    begins, lengths = _runs(still)
+    stuck = (lengths >= LONGEST_REPEAT) & (jumps[begins] | jumps[begins + lengths + 1])
+    if not stuck.any():
+        return ""
+    k = int(np.argmax(lengths * stuck))
+    rows = f"rows {begins[k] + 2} to {begins[k] + lengths[k] + 2}"
+    return f"stands still at {values[begins[k]]:.4g} over {rows}"
+
+
+def _runs(true: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return the begins and lengths of the runs of true values."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], true, [False])).astype(np.int8)))
+    return edges[::2], edges[1::2] - edges[::2]
+
+
 def _longest(true: NDArray[np.bool_]) -> int:
     """Return the length of the longest run of true values."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], true, [False])).astype(np.int8)))
-    return int((edges[1::2] - edges[::2]).max(initial=0))
+    return int(_runs(true)[1].max(initial=0))
 
 
 def quantised_step(values: Floats) -> float | None:
