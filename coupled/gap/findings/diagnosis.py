@@ -138,6 +138,12 @@ class Diagnosis(Findings, TableResult):
         return tuple(one for one in self.effects if one.probability >= CERTAIN)
 
     @property
+    def flight_in_words(self) -> str:
+        """How the effects change the flight, and which to correct first; nothing without one."""
+        credible = [effect.label for effect in self.credible]
+        return "" if self.in_flight is None else in_words(self.in_flight, credible)
+
+    @property
     def with_curves(self) -> Rig:
         """The rig with the credible effects and the curves; without curves, the improved rig."""
         rigs = [p.improved if p.curved is None else p.curved.rig for p in self.parts]
@@ -222,7 +228,7 @@ class Diagnosis(Findings, TableResult):
         words |= {name: words[name].removeprefix(no_gap_in([name])).strip() for name in clear}
         said = [self.trim, *(f"{capital(name)}: {one}" for name, one in words.items() if one)]
         said += [no_gap_in(clear)] if clear else []
-        said += [in_words(self.in_flight)] if self.in_flight is not None else []
+        said += [self.flight_in_words]
         said += [self.next_test, *self.left_out]
         return " ".join(one for one in said if one)
 
@@ -340,8 +346,7 @@ class PartDiagnosis(Diagnosis):
     @cached_property
     def summary(self) -> str:
         """The faults, their sizes, probabilities and shares of the gap, and what to record next."""
-        flight = "" if self.in_flight is None else in_words(self.in_flight)
-        said = (self.trim, self.words(flight, self.next_test), *self.left_out)
+        said = (self.trim, self.words(self.flight_in_words, self.next_test), *self.left_out)
         return " ".join(words for words in said if words)
 
     def words(self, flight: str = "", next_test: str = "") -> str:

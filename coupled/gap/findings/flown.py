@@ -8,7 +8,7 @@ difference is its Shapley value. The effect with the largest share should be cor
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any, Literal
@@ -282,8 +282,11 @@ def _unstamped(rig: Rig, controls: Sequence[ControlName]) -> Rig:
     return rig.changed({"flight.motion_stamp_s": 0.0, **stamps}) if late else rig
 
 
-def in_words(effects: Sequence[EffectInFlight]) -> str:
-    """Return in words how the effects change the flight, and which to correct first."""
+def in_words(effects: Sequence[EffectInFlight], credible: Collection[str]) -> str:
+    """Return in words how the effects change the flight, and which to correct first.
+
+    It is the one of the largest share among the `credible` effects, given by their labels.
+    """
     shown = [effect for effect in effects if effect.shows]
     if not shown:
         return "In flight it hardly shows: no channel of the motion changes by 1 %."
@@ -292,9 +295,10 @@ def in_words(effects: Sequence[EffectInFlight]) -> str:
         moved = ((plain(split_unit(name)[0]), by) for name, by in only.of_motion.items())
         parts = [f"the {name} by {_per_cent(by)}" for name, by in moved]
         return f"In flight it changes {joined(parts)} of their rms."
-    parts = [f"{labelled(e.name, e.control)} {_per_cent(e.share)}" for e in effects]
-    first = labelled(effects[0].name, effects[0].control)
-    return f"Shares of the change in flight: {joined(parts)}. Correct {first} first."
+    shares = {labelled(e.name, e.control): _per_cent(e.share) for e in effects}
+    parts = [f"{label} {share}" for label, share in shares.items()]
+    first = next((f" Correct {label} first." for label in shares if label in credible), "")
+    return f"Shares of the change in flight: {joined(parts)}.{first}"
 
 
 def _per_cent(share: float) -> str:
