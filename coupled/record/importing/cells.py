@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, time, timedelta
@@ -22,6 +23,7 @@ _HOUR_us = _DAY_us // 24
 MOST_STEPS = 2.0  # step across a wrap, over the largest other step, with the right period
 PERIOD = 0.002  # tolerance of a period for counts and noise, relative
 FARTHEST = 0.25  # of a turn between two rows; from a half on, the direction is ambiguous
+_FINER = re.compile(r"(?<=[.,:]\d{6})\d+")  # digits below 1 µs, which strptime does not read
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 
 
@@ -288,7 +290,7 @@ def continued(clock_us: pl.Series) -> pl.Series:
 
 def _moment(text: str, pattern: str) -> datetime | time:
     if pattern != ISO:
-        found = datetime.strptime(text, pattern)
+        found = datetime.strptime(_FINER.sub("", text), pattern)
         if "%Y" not in pattern and "%y" not in pattern:
             return found.time()
     elif "-" not in text and ":" in text:

@@ -9,6 +9,7 @@ clock.
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -141,6 +142,10 @@ def read_map(path: Path) -> LogMap:
     table, faults = load_toml(path), list[InputError]()
     with collected(faults):
         known_keys(table, file_keys(LogMap, "m"), path, "")
+    open_keys = [*_open_keys({key: table[key] for key in table if key != "log"}, "")]
+    if open_keys:
+        problem = '"?" is a question of the proposed map: replace it by the answer'
+        raise together([*faults, *(InputError(path, key, problem) for key in open_keys)])
     channels = table.get("channels")
     if not isinstance(channels, dict) or not channels:
         problem = "needs at least one, as [channels.column_force_N]"
@@ -167,6 +172,15 @@ def read_map(path: Path) -> LogMap:
     if faults or found is None:
         raise together(faults)
     return found
+
+
+def _open_keys(table: dict[str, Any], path: str) -> Iterator[str]:
+    """Yield the keys that a proposed map has left to the user."""
+    for key, value in table.items():
+        if isinstance(value, dict):
+            yield from _open_keys(value, f"{path}{key}.")
+        elif value == "?":
+            yield path + key
 
 
 def _check_name(name: str, channel: Channel, path: Path) -> None:
@@ -205,9 +219,6 @@ def _faults(found: LogMap, path: Path) -> list[InputError]:
             _check_stamps(clock, path, f"clocks.{name}")
     if not found.log.delimiter.isascii() or found.log.delimiter in '"\r\n':
         problem = f'is {found.log.delimiter!r}; give one plain character, as ";" or "\\t"'
-        faults.append(InputError(path, "log.delimiter", problem))
-    if found.log.decimal == "," and found.log.delimiter == ",":
-        problem = 'is the decimal comma as well; give the delimiter, as ";"'
         faults.append(InputError(path, "log.delimiter", problem))
     for name, channel in found.channels.items():
         if channel.scale == 0.0:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
@@ -43,6 +44,7 @@ FORMATS = {
     **dict.fromkeys((".ulg", ".ulog"), "ulog"),
     **dict.fromkeys((".json", ".jsonl", ".ndjson"), "json"),
 }
+_QUOTED_COMMA = re.compile(r'"\s*[-+]?\d*,\d')
 LATEST_ns = 1e19  # a clock in ns since 1970 is larger than any quantity of a record
 
 
@@ -204,7 +206,7 @@ def read_log(path: Path, layout: Layout) -> Log:
     if kind == "csv":
         return _read_csv(path, content, layout)
     if kind == "json":
-        columns, lines, doubled = read_json(path, _text(path, content, layout.encoding))
+        columns, lines, doubled = read_json(path, text_of(path, content, layout.encoding))
         numbered = np.array(lines, dtype=np.int64)
         return Log(path, columns, doubled=doubled, lines=numbered, decimal=layout.decimal)
     if kind == "parquet":
@@ -235,13 +237,16 @@ def _which(names: Sequence[str]) -> str:
 
 
 def _read_csv(path: Path, content: bytes, layout: Layout) -> Log:
-    text = _text(path, content, layout.encoding)
+    text = text_of(path, content, layout.encoding)
     kept, lines = _rows(text, layout)
     if not kept:
         raise InputError(path, "", "is empty")
     delimiter = layout.delimiter
     if path.suffix.lower() == ".tsv" and delimiter == ",":
         delimiter = "\t"
+    if delimiter == layout.decimal == "," and not any(_QUOTED_COMMA.search(line) for line in kept):
+        problem = "log.delimiter is the decimal comma as well, and no number is quoted"
+        raise InputError(path, "", f'{problem}; give the delimiter, as ";"')
     if delimiter == " ":  # any white space
         kept = ["\t".join(line.split()) for line in kept]
         delimiter = "\t"
@@ -295,15 +300,20 @@ def _table(path: Path, kept: list[str], lines: Sequence[int], delimiter: str) ->
     raise InputError(path, "", problem)
 
 
-def _text(path: Path, content: bytes, encoding: str) -> str:
+def text_of(path: Path, content: bytes, encoding: str) -> str:
+    """Return a log's text. UTF-16 may lack its byte order mark if the first character is ASCII."""
+    codec = "utf-8-sig" if encoding == "utf-8" else encoding
+    if encoding == "utf-16" and b"\0" in content[:2]:
+        codec = "utf-16-be" if content[:1] == b"\0" else "utf-16-le"
     try:
-        text = content.decode("utf-8-sig" if encoding == "utf-8" else encoding)
+        text = content.decode(codec)
     except UnicodeError:
         known = "utf-8, latin-1 or utf-16"
         problem = f"is not text in {encoding.upper()}; set log.encoding to {known}"
         raise InputError(path, "", problem) from None
     if "\0" in text:
-        raise InputError(path, "", "holds bytes that are no text: another format?")
+        problem = 'holds bytes that are no text: log.encoding = "utf-16", or another format?'
+        raise InputError(path, "", problem)
     return text
 
 

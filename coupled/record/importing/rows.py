@@ -93,7 +93,7 @@ def check_steps(
         line = log.line(first + row + 1)
         problem = f"row {line} repeats the time of the row before, {time_s[row]:.6f} s after the"
         problem += " first row; "
-        if np.mean(steps_s == 0.0) > COARSE:
+        if np.mean(steps_s == 0.0) > COARSE and not _all_repeat(log, time_s, first, clock):
             problem += "stamps are coarse: where rows are even, give clock.rate_Hz and no from"
         elif clock.drop_duplicates:
             problem += f"the two rows differ: {key}.drop_rows = [{line}] leaves this one out"
@@ -114,6 +114,14 @@ def check_steps(
     problem = f"row {log.line(first + row + 1)}: {lost} rows are missing after {time_s[row]:.6f} s;"
     problem += f" longest_gap_rows = {longest_gap} allows no more; cut by start_s or end_s"
     raise InputError(log.file, clock.source, problem)
+
+
+def _all_repeat(log: Log, time_s: Floats, first: int, clock: Stamped) -> bool:
+    """Tell whether each row with the stamp of the row before equals that row."""
+    rows = log.columns[clock.source].len()
+    cells = [each for each in log.columns.values() if each.len() == rows]
+    again = np.flatnonzero(np.diff(time_s) == 0.0) + first + 1
+    return all(bool(_repeats(each)[again].all()) for each in cells)
 
 
 def _drop(log: Log, clock: Stamped, rows: int, map_file: Path, key: str) -> Log:

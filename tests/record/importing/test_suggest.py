@@ -127,7 +127,7 @@ def test_an_open_unit_is_asked_and_its_map_refused(tmp_path: Path) -> None:
     assert table["channels"]["column_force_N"]["unit"] == "?"
     assert "N or daN or lbf" in proposal.questions[0]
     (tmp_path / "map.toml").write_text(proposal.text)
-    with pytest.raises(InputError, match=r"map.toml: channels.column_force_N.unit: '\?'"):
+    with pytest.raises(InputError, match=r'map.toml: channels.column_force_N.unit: "\?" is a q'):
         import_log(tmp_path / "log.csv", tmp_path / "map.toml")
 
 

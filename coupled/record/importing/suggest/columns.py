@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import re
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -10,9 +13,13 @@ import polars as pl
 from numpy.typing import NDArray
 
 from coupled.errors import InputError
-from coupled.record.importing.cells import ISO, lists_in, moments
+from coupled.record.importing.cells import lists_in
+from coupled.record.importing.mapping import Stamped
 from coupled.record.importing.reading import LATEST_ns, Log
+from coupled.record.importing.suggest.dates import CLOCK, read_dates
+from coupled.record.importing.suggest.dialect import is_number
 from coupled.record.importing.suggest.names import Reading, read_name
+from coupled.record.importing.suggest.sizes import forward_steps, sentinels
 
 Floats = NDArray[np.float64]
 FEW = 0.1  # share of a column's cells that may be empty or not numbers
@@ -23,7 +30,8 @@ class Column:
     """A column: the content of its name and of its cells.
 
     `values` are its numbers, NaN if empty, shape (rows,); for a column of lists, their first
-    elements, and `length` is the number of elements. Dates are in s from the first.
+    elements, and `length` is the number of elements. Dates are in s from the first, in the pattern
+    `date`, which is "?" if it is unknown. The rows `footer`, below the last time, are left out.
     """
 
     log: str
@@ -32,6 +40,8 @@ class Column:
     kind: Literal["numbers", "lists", "dates", "text"]
     values: Floats
     length: int = 0
+    date: str = ""
+    footer: str = ""
 
     @property
     def moves(self) -> bool:
@@ -39,10 +49,32 @@ class Column:
         there = self.values[np.isfinite(self.values)]
         return there.size > 1 and bool(there.max() > there.min())
 
+    @property
+    def is_clock(self) -> bool:
+        """Whether it can be the time of the rows: by its name, or by its cells."""
+        if self.reading.channel != "time" or self.kind == "lists":
+            return False
+        steps = np.diff(self.values[np.isfinite(self.values)])
+        back = steps.size - forward_steps(self.values).size - np.count_nonzero(steps == 0.0)
+        orderly = self.reading.sure or bool(back <= FEW * np.count_nonzero(steps))
+        return self.date == "?" or (self.moves and orderly)
+
 
 def columns_of(log: Log) -> list[Column]:
     """Return a log's columns in their order, including those without numbers."""
-    return [_column(log, name) for name in log.columns]
+    columns = [_column(log, name) for name in log.columns]
+    clock = next((c for c in columns if c.is_clock and c.moves), None)
+    if clock is None:
+        return columns
+    rows, last = clock.values.size, int(np.flatnonzero(np.isfinite(clock.values))[-1])
+    if not rows - FEW * rows <= last + 1 < rows:
+        return columns
+    lines = dict.fromkeys(str(log.line(row)) for row in (last + 1, rows - 1))
+    footer = "-".join(lines)
+    return [
+        replace(c, values=c.values[: last + 1], footer=footer) if c.values.size == rows else c
+        for c in columns
+    ]
 
 
 def _column(log: Log, name: str) -> Column:
@@ -55,13 +87,16 @@ def _column(log: Log, name: str) -> Column:
         text = str(first[0]) if first.len() else ""
         if text[:1] in "[({" and text:
             return _lists(log, name, reading, cells)
-        if reading.channel == "time" and (":" in text or text.count("-") == 2):
-            return _dates(log, name, reading, cells)
+        stamped = reading.channel == "time" and reading.sure and not is_number(text)
+        if re.search(CLOCK, text) or (stamped and re.search(r"\d", text)):
+            return _dates(log, name, reading)
     elif isinstance(cells.dtype, (pl.List, pl.Array)):
         return _lists(log, name, reading, cells)
     elif cells.dtype.is_temporal():
-        counts = cells.to_physical().cast(pl.Float64).to_numpy().astype(np.float64)
-        return Column(log.file.name, name, reading, "dates", counts - counts[:1])
+        with suppress(InputError):  # days
+            times = log.times(Stamped(source=name), log.file, "clock")
+            reading = replace(reading, channel="time")
+            return Column(log.file.name, name, reading, "dates", times.from_first_s)
     values = _doubles(log.point(cells))
     kind: Literal["numbers", "text"] = "numbers"
     if values.size == 0 or np.mean(np.isnan(values)) > FEW or np.isnan(values).all():
@@ -88,10 +123,24 @@ def _lists(log: Log, name: str, reading: Reading, cells: pl.Series) -> Column:
     return Column(log.file.name, name, reading, "lists", values, length)
 
 
-def _dates(log: Log, name: str, reading: Reading, cells: pl.Series) -> Column:
-    try:
-        counts = moments(cells, ISO, log.file, name, log.line)
-    except InputError:
-        return Column(log.file.name, name, reading, "text", np.full(cells.len(), np.nan))
-    times = counts.cast(pl.Float64).to_numpy().astype(np.float64)
-    return Column(log.file.name, name, reading, "dates", 1e-6 * (times - times[0]))
+def _dates(log: Log, name: str, reading: Reading) -> Column:
+    found = read_dates(log, name)
+    if found is not None:
+        reading = replace(reading, channel="time")
+        return Column(log.file.name, name, reading, "dates", found[1], date=found[0])
+    nothing = np.full(log.columns[name].len(), np.nan)
+    varies = reading.channel == "time" and log.columns[name].n_unique() > 1
+    date = "?" if varies else ""
+    return Column(log.file.name, name, reading, "text", nothing, date=date)
+
+
+def missing_in(log: Log, columns: Sequence[Column]) -> set[str]:
+    """Return the texts of the log's cells that stand for an empty cell in all their columns."""
+    columns = [c for c in columns if c.log == log.file.name and not c.is_clock]
+    cells = [
+        (log.columns[c.name].head(c.values.size), pl.Series(c.values).is_in(sentinels(c.values)))
+        for c in columns
+        if log.columns[c.name].dtype == pl.String and c.kind == "numbers"
+    ]
+    found = {text for each, far in cells for text in each.filter(far).to_list()}
+    return found.difference(*(each.filter(~far).to_list() for each, far in cells))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import re
+from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
@@ -12,7 +13,7 @@ from typing import Literal
 from coupled.errors import InputError
 from coupled.files import read_bytes
 from coupled.record.importing.mapping import Layout
-from coupled.record.importing.reading import FORMATS
+from coupled.record.importing.reading import FORMATS, text_of
 from coupled.units import parse_unit
 
 LOOKED_AT = 400  # lines from which the layout is guessed
@@ -21,6 +22,8 @@ DELIMITERS = ("\t", ";", ",", " ")  # a semicolon before a comma, which may be t
 MOST_WORDS = 5
 _NUMBER = re.compile(r"[-+]?(\d+[.,]?\d*|[.,]\d+)([eE][-+]?\d+)?")
 _COMMA = re.compile(r"[-+]?\d*,\d+([eE][-+]?\d+)?")
+_STAMP = re.compile(r"\d.*\d:\d\d|\d:\d\d")  # the first cell of a row without a header
+_THOUSANDS = re.compile(r"[-+]?[1-9]\d{0,2},\d{3}")
 
 
 def guess_layout(path: Path) -> Layout:
@@ -42,15 +45,17 @@ def guess_layout(path: Path) -> Layout:
     first = next(i for i, row in enumerate(cells) if len(row) == width)
     skipped = rows[first][0] if not comment else _skipped(rows[first][0], lines, comment)
     cells = cells[first:]
-    header = not all(is_number(cell) or not cell for cell in cells[0])
+    header = not all(is_number(cell) or not cell or _STAMP.match(cell) for cell in cells[0])
     units_row = header and _holds_units(cells[1]) and any(map(is_number, cells[2]))
     below = cells[(2 if units_row else 1) if header else 0 :]
-    decimal: Literal[".", ","] = "."
-    if delimiter != "," and any(_COMMA.fullmatch(cell) for row in below for cell in row):
-        decimal = ","
+    found = {cell for row in below for cell in row if is_number(cell)}
+    commas = {cell for cell in found if _COMMA.fullmatch(cell)}
+    if delimiter == ",":  # of quoted cells, which may have commas between thousands
+        points = any("." in cell for cell in found)
+        commas = set() if points else {cell for cell in commas if not _THOUSANDS.fullmatch(cell)}
     return Layout(
         delimiter=delimiter,
-        decimal=decimal,
+        decimal="," if commas else ".",
         comment=comment,
         skip_rows=skipped,
         header=header,
@@ -66,18 +71,15 @@ def is_number(cell: str) -> bool:
 
 
 def _decoded(path: Path, content: bytes) -> tuple[Literal["utf-8", "latin-1", "utf-16"], str]:
-    if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
+    encoding: Literal["utf-8", "latin-1", "utf-16"] = "utf-8"
+    if content[:2] in (BOM_UTF16_LE, BOM_UTF16_BE) or b"\0" in content[:2]:
+        encoding = "utf-16"
+    else:
         try:
-            return "utf-16", content.decode("utf-16")
+            content.decode()
         except UnicodeError:
-            raise InputError(path, "", "begins as UTF-16 does, and is none") from None
-    try:
-        text = content.decode("utf-8-sig")
-    except UnicodeError:
-        return "latin-1", content.decode("latin-1")
-    if "\0" in text:
-        raise InputError(path, "", "holds bytes that are no text: another format?")
-    return "utf-8", text
+            encoding = "latin-1"
+    return encoding, text_of(path, content, encoding)
 
 
 def _split(line: str, delimiter: str) -> list[str]:

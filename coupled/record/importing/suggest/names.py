@@ -53,7 +53,8 @@ MOTION = {
 }
 # Short names of surfaces; in other units than an angle's they are a control's.
 SHORT = {"elev": "elevator_rad", "ail": "aileron_rad", "rud": "rudder_rad"}
-TIME = _set("time t timestamp stamp clock utc date datetime elapsed sec seconds")
+TIME = _set("time timestamp stamp clock utc date datetime elapsed sec seconds")
+TIME |= _set("zeit uhrzeit zeitstempel datum")
 TORQUE = _set("torque moment nm")
 # Words of names that have a load or a state but are no part of a control.
 COMPUTER = _set(
@@ -80,8 +81,8 @@ _LOWER = {key.lower(): unit for key, unit in SUFFIXES.items()}
 class Reading:
     """The content of a name. `channel` is "time", a record's channel, or "" if it has none.
 
-    `sure` is false if the control or the meaning is ambiguous; `either_end`: it is a position of
-    the grip or the computed one.
+    `sure` is false if the control or the meaning is ambiguous, as that of a time which has only
+    the unit of one; `either_end`: it is a position of the grip or the computed one.
     """
 
     channel: str
@@ -103,8 +104,9 @@ def read_name(name: str, listed_unit: str = "", log: str = "") -> Reading:
     stem, unit = _unit(name)
     unit = listed_unit if parse_unit(listed_unit) is not None else unit
     words = words_of(stem)
-    if set(words) & TIME and not set(words) & {"rate"}:
-        return Reading("time", unit if _is(unit, "s") else "")
+    timed = _is(unit, "s")
+    if set(words) & {*TIME, "t"} and "rate" not in words and (timed or not unit):
+        return Reading("time", unit, timed or bool(set(words) & TIME))
     text = " ".join(words)
     for found, spellings in MOTION.items():
         if text in spellings.split("|") or any(
@@ -113,7 +115,8 @@ def read_name(name: str, listed_unit: str = "", log: str = "") -> Reading:
             return Reading(found, unit)
     if text in SHORT and (not unit or _is(unit, "rad")):
         return Reading(SHORT[text], unit)
-    return _moved(words, unit, words_of(log)) or Reading("", unit)
+    moved = _moved(words, unit, words_of(log))
+    return moved or Reading("time" if timed else "", unit, not timed)
 
 
 def _unit(name: str) -> tuple[str, str]:

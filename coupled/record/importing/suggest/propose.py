@@ -21,8 +21,9 @@ from coupled.record.channels import channel as channel_name
 from coupled.record.importing.mapping import CHANNELS, Layout, own_unit
 from coupled.record.importing.plausible import move_oppositely
 from coupled.record.importing.reading import Log, read_log
+from coupled.record.importing.rows import COARSE
 from coupled.record.importing.suggest import sizes
-from coupled.record.importing.suggest.columns import Column, columns_of
+from coupled.record.importing.suggest.columns import Column, columns_of, missing_in
 from coupled.record.importing.suggest.dialect import guess_layout
 from coupled.record.importing.suggest.ends import settle_ends
 from coupled.record.importing.suggest.names import is_torque, words_of
@@ -66,13 +67,16 @@ def propose(files: Sequence[Path], rig: Rig | None = None) -> Proposal:
     questions on force and deflection. Raises InputError for a file that is not a log.
     """
     layout = guess_layout(files[0])
-    read = [read_log(file, layout) for file in files]
-    columns = [column for log in read for column in columns_of(log)]
+    read, columns = _read(files, layout)
+    far = sorted({text for log in read for text in missing_in(log, columns)})
+    if far:
+        layout = layout.model_copy(update={"missing": [*layout.missing, *far]})
+        read, columns = _read(files, layout)
     logs = [file.name for file in files]
     chosen = _chosen([c for c in columns if c.reading.channel != "time"])
     chosen, asked = settle_ends(chosen)
     clock, clocks = _clocks(_stamps_first(columns, read, chosen), logs)
-    sections = [("log", _layout_lines(layout)), ("clock", clock)]
+    sections = [("log", _layout_lines(layout, far)), ("clock", clock)]
     sections += [(f"clocks.{json.dumps(name)}", lines) for name, lines in clocks.items()]
     for channel in CHANNELS:
         if channel in chosen:
@@ -82,7 +86,8 @@ def propose(files: Sequence[Path], rig: Rig | None = None) -> Proposal:
     sections = _signs(sections, chosen)
     mapped = {channel: _named(chosen[channel], logs) for channel in CHANNELS if channel in chosen}
     used = {(c.log, c.name) for c in chosen.values()}
-    left = [c for c in columns if (c.log, c.name) not in used and c.reading.channel != "time"]
+    used |= {(log, str(name)) for log in logs for _, name, _ in clocks.get(log, clock)[:1]}
+    left = [c for c in columns if (c.log, c.name) not in used]
     unmapped = tuple(_named(column, logs) for column in left)
     if not mapped:
         sections += _skeleton([column for column in left if column.moves], rig, logs)
@@ -96,6 +101,11 @@ def propose(files: Sequence[Path], rig: Rig | None = None) -> Proposal:
     warnings += [f"{name}: {why}" for log in read for name, why in log.refused.items()]
     text = _text(sections, logs, unmapped)
     return Proposal(text, questions, mapped, unmapped, tuple(dict.fromkeys(warnings)))
+
+
+def _read(files: Sequence[Path], layout: Layout) -> tuple[list[Log], list[Column]]:
+    read = [read_log(file, layout) for file in files]
+    return read, [column for log in read for column in columns_of(log)]
 
 
 def _skeleton(
@@ -129,21 +139,31 @@ def _with_range(column: Column, logs: Sequence[str]) -> str:
 def _stamps_first(
     columns: Sequence[Column], logs: Sequence[Log], chosen: Mapping[str, Column]
 ) -> list[Column]:
-    """Return the columns, first those with the stamps of the chosen columns' groups."""
+    """Return the clocks, first those with the stamps of the chosen columns' groups.
+
+    Fine stamps come before coarse ones, and stamps in order before those that go back.
+    """
     stamps = {log.file.name: log.stamps for log in logs}
     order = [stamps[c.log].get(c.name) for name in CHANNELS if (c := chosen.get(name))]
     place = {name: i for i, name in reversed(list(enumerate(order)))}
-    return sorted(columns, key=lambda column: place.get(column.name, len(order)))
+
+    def rank(column: Column) -> tuple[int, bool, bool]:
+        steps = np.diff(column.values)
+        coarse = not column.moves or float(np.mean(steps == 0.0)) > COARSE
+        return place.get(column.name, len(order)), coarse, bool((steps < 0.0).any())
+
+    return sorted((column for column in columns if column.is_clock), key=rank)
 
 
 def _named(column: Column, logs: Sequence[str]) -> str:
     return column.name if len(logs) == 1 else f"{column.log}: {column.name}"
 
 
-def _layout_lines(layout: Layout) -> list[Line]:
+def _layout_lines(layout: Layout, far: Sequence[str]) -> list[Line]:
     plain = Layout()
+    remarks = {"missing": f"{' and '.join(far)}: far outside the other numbers" if far else ""}
     return [
-        (key, getattr(layout, field), "")
+        (key, getattr(layout, field), remarks.get(key, ""))
         for key, field in file_keys(Layout, "m").items()
         if getattr(layout, field) != getattr(plain, field)
     ]
@@ -164,39 +184,36 @@ def _alike(lines: Sequence[Line], others: Sequence[Line]) -> bool:
 
 
 def _clock(columns: Sequence[Column], log: str, several: bool, main: bool) -> list[Line]:
-    for column in columns:
-        if column.log != log or column.reading.channel != "time":
-            continue
-        steps = np.diff(column.values)
-        steps = steps[np.isfinite(steps)]
-        if column.kind in ("text", "lists") or not steps.size:
-            continue
-        if steps.min() < 0.0 or steps.max() <= 0.0:  # not a time, or constant
-            continue
-        lines: list[Line] = [("from", column.name, "")]
-        fit = [column.reading.unit] if column.reading.unit else sizes.time_units(steps)
-        if column.kind == "dates":
-            lines.append(("date", "iso", ""))
-            fit = ["s"]
-        elif column.reading.unit:
-            lines.append(("unit", column.reading.unit, "by its name"))
-        else:
-            lines.append(("unit", *_one_of(fit, f"steps of {steps[0]:.6g}")))
-        return lines + (_rate(column.values, fit[0]) if len(fit) == 1 and main else [])
-    if several:
+    column = next((column for column in columns if column.log == log), None)
+    if column is None and several:
         return [("from", "?", "the column with the time: several logs need their stamps")]
-    return [("rate_Hz", "?", "no column holds the time: how many rows come in a second?")]
+    if column is None:
+        return [("rate_Hz", "?", "no column holds the time: how many rows come in a second?")]
+    lines: list[Line] = [("from", column.name, "")]
+    fit = [column.reading.unit or "s"]
+    if column.date:
+        remark = 'in which pattern? as "%d.%m.%Y %H:%M:%S.%f"' if column.date == "?" else ""
+        lines.append(("date", column.date, remark))
+        fit = [] if remark else fit
+    elif column.kind != "dates" and column.reading.unit:
+        lines.append(("unit", column.reading.unit, "by its name"))
+    elif column.kind != "dates":
+        fit = sizes.time_units(column.values)
+        step = float(np.median(sizes.forward_steps(column.values)))
+        lines.append(("unit", *_one_of(fit, f"steps of {step:.6g}")))
+    if column.footer:
+        lines.append(("drop_rows", [column.footer], "without a time: a summary?"))
+    return lines + (_rate(column.values, fit[0]) if len(fit) == 1 and main else [])
 
 
 def _rate(values: Floats, unit: str) -> list[Line]:
     """Return the line of the frame rate, if the rows are uneven."""
-    values = values[np.isfinite(values)]
     known = parse_unit(unit)
     time_s = values * known.factor if known is not None else values
     rate = sizes.even_rate(time_s)
-    if rate is None or not np.isfinite(rate):
+    if rate is None:
         return []
-    steps_ms = 1e3 * np.diff(time_s)
+    steps_ms = 1e3 * sizes.forward_steps(time_s)
     apart = f"the rows come unevenly, {steps_ms.min():.4g} to {steps_ms.max():.4g} ms apart"
     return [("frame_rate_Hz", rate, apart)]
 

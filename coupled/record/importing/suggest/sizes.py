@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from coupled.record.importing.clock import EVEN_frames
 from coupled.record.importing.mapping import factor_of, own_unit
+from coupled.record.importing.rows import COARSE
 from coupled.rig.parameters import Control
 from coupled.units import parse_unit
 
@@ -37,6 +38,9 @@ COMMON_Hz = (
     *(200.0, 240.0, 250.0, 256.0, 400.0, 480.0, 500.0, 1000.0, 2000.0),
 )
 TIMES = ("s", "ms", "us", "ns")
+USUAL = 0.5  # largest deviation of a usual step from the median one, relative
+LEAST_others = 10  # different numbers beside a sentinel
+FAR = 5.0  # distance of a sentinel from the other numbers, over their range
 COUNTS = 100.0  # integers above this are counts of an encoder or a converter
 
 
@@ -57,9 +61,10 @@ def units_that_fit(channel: str, values: Floats, control: Control | None = None)
     return [u for u in _UNITS[own] if least <= peak * factor_of(channel, u, "") <= most]
 
 
-def time_units(steps: Floats) -> list[str]:
-    """Return the units of time in which the median step is realistic for a test's log."""
-    step = float(np.median(steps)) if steps.size else 0.0
+def time_units(values: Floats) -> list[str]:
+    """Return the units of time in which the usual time of a row is realistic for a test's log."""
+    steps = forward_steps(values)
+    step = float(np.median(steps)) * steps.size / (values.size - 1)  # stamps may be coarse
     fit = []
     for name in TIMES:
         unit = parse_unit(name)
@@ -69,14 +74,26 @@ def time_units(steps: Floats) -> list[str]:
     return fit
 
 
-def even_rate(time_s: Floats) -> float | None:
-    """Return a rate, in Hz, for frames over uneven rows; None if they are even.
+def forward_steps(values: Floats) -> Floats:
+    """Return the steps of a time from row to row in its main direction, without repetitions."""
+    steps = np.diff(values[np.isfinite(values)])
+    sign = 1.0 if np.count_nonzero(steps > 0.0) >= np.count_nonzero(steps < 0.0) else -1.0
+    return np.asarray(sign * steps[sign * steps > 0.0])
 
-    A round rate, if there is one within 3 % of the rows' own.
+
+def even_rate(time_s: Floats) -> float | None:
+    """Return a rate, in Hz, for frames over uneven rows; None if they are even, or it is unclear.
+
+    It is that of the steps near the median one: gaps and steps back do not change it. A round
+    rate, if there is one within 3 % of the rows' own.
     """
-    rate = (time_s.size - 1) / float(np.ptp(time_s))
-    stray = time_s - time_s[0] - np.arange(time_s.size) / rate
-    if float(np.ptp(stray)) * rate < EVEN_frames:
+    steps = forward_steps(time_s)
+    usual = steps[np.abs(steps / np.median(steps) - 1.0) < USUAL]
+    if usual.size < (1.0 - COARSE) * (time_s.size - 1):
+        return None
+    rate = 1.0 / float(usual.mean())
+    stray = np.cumsum(usual * rate - 1.0)
+    if float(np.ptp(stray)) < EVEN_frames or not RATES_Hz[0] <= rate <= RATES_Hz[1]:
         return None
     near = [each for each in COMMON_Hz if abs(each / rate - 1.0) < 0.03]
     return min(near, key=lambda each: abs(each - rate)) if near else float(f"{rate:.3g}")
@@ -86,6 +103,21 @@ def are_counts(values: Floats) -> bool:
     """Tell whether a column has integers as large as those of an encoder."""
     there = values[np.isfinite(values)]
     return bool(there.size and np.all(there == np.rint(there)) and np.ptp(there) >= COUNTS)
+
+
+def sentinels(values: Floats) -> list[float]:
+    """Return the numbers that stand for an empty cell: each repeats, far outside the others."""
+    there = values[np.isfinite(values)]
+    ends = (there.min(), there.max()) if there.size and not kept_sign(values) else ()
+    others = there[(there > ends[0]) & (there < ends[1])] if ends else there
+    if np.unique(others).size < LEAST_others:
+        return []
+    return [
+        float(end)
+        for end in ends
+        if np.count_nonzero(there == end) > 1
+        and np.abs(others - end).min() > FAR * float(np.ptp(others))
+    ]
 
 
 def kept_sign(values: Floats) -> str:
