@@ -51,12 +51,13 @@ from coupled.record.channels import (
 )
 from coupled.record.importing import plausible
 from coupled.record.importing.account import log_rate_of
+from coupled.record.importing.redundant import force_unit, other_units, rate_ratio, reversed_rates
 from coupled.record.record import Record
 from coupled.record.samples import FINER, check_samples, sampling_rate_of
 from coupled.resources import aircraft_folder
 from coupled.rig.equations import specified_gradient
 from coupled.rig.parameters import Flight
-from coupled.rig.replay import replay_schedule
+from coupled.rig.replay import replay_schedule, replay_surface
 from coupled.rig.rig import Rig
 from coupled.rig.rigfile import rig_from_table
 from coupled.schema import changed, file_keys
@@ -95,11 +96,33 @@ def check_record(
         _check_channels(rig, record, control, file)
 
 
+def check_units(rig: Rig, record: Record, control: ControlName, file: object) -> None:
+    """Raise InputError if a channel has another unit or sign, by channels that determine it.
+
+    Before the trim is taken from the record, since a speed in knots has none.
+    """
+    columns = _columns(record)
+    found = other_units(columns, rig)
+    force = force_unit(columns, rig, control) if not found else None
+    found |= {channel(control, "force"): force} if force is not None else {}
+    for name, one in found.items():
+        raise InputError(file, name, f"{one.reason}: it is in {one.unit}")
+    for name, angle in reversed_rates(columns).items():
+        raise InputError(file, name, f"moves against {angle}: one of them is reversed")
+
+
+def _columns(record: Record) -> dict[str, Floats]:
+    return dict(zip(record.channels, record.data.T, strict=True))
+
+
 def _check_angles(record: Record, file: object) -> None:
-    """Raise InputError if an angle or a rate of the motion, or a surface, is beyond that in flight.
+    """Raise InputError if the load factor, an angle, a rate or a surface is beyond that in flight.
 
     Roll and heading may be counted on over full turns, so that their size shows no unit.
     """
+    load = "load_factor"
+    if load in record and (doubt := plausible.size_doubt(load, record[load])) is not None:
+        raise InputError(file, load, doubt)
     turning = ("roll_rad", "heading_rad")
     angles = (one for one in (*LONGITUDINAL, *LATERAL) if one.endswith(("_rad", "_rad_per_s")))
     for name in (one for one in angles if one in record and one not in turning):
@@ -152,7 +175,6 @@ def _check_channels(rig: Rig, record: Record, control: ControlName, file: object
             problem = f"reaches {most:.3g}, beyond {travel:g}: is it in another unit?"
             raise InputError(file, name, problem)
     _check_signs(rig, record, control, file)
-    _check_force_unit(record, control, file)
     _check_schedule(rig, record, control, file)
 
 
@@ -172,11 +194,14 @@ def _check_signs(rig: Rig, record: Record, control: ControlName, file: object) -
         raise InputError(file, force, problem)
 
 
-def check_against_model(outputs: Sequence[Output], rig: Rig, files: Sequence[object]) -> None:
+def check_against_model(
+    outputs: Sequence[Output], rig: Rig, files: Sequence[object], records: Sequence[Record]
+) -> None:
     """Raise InputError if a surface, or the pitch or roll rate, moves against the model's.
 
     No effect of the library reverses these. Errors of the model may reverse the yaw rate, by
-    adverse yaw, and slow changes of speed or height.
+    adverse yaw, and slow changes of speed or height. A surface is an input of the model's flight,
+    so a reversed one reverses the model's rate: the attitude shows which of the two is right.
     """
     signed = (*map(surface_channel, CONTROL_NAMES), RATE["column"], RATE["wheel"])
     for output in outputs:
@@ -185,7 +210,32 @@ def check_against_model(outputs: Sequence[Output], rig: Rig, files: Sequence[obj
         predicted = output.measured - output.floor * output.residual(rig)
         if plausible.move_oppositely(predicted, output.measured, REVERSED):
             problem = f"moves against that of {rig.name}: is its sign reversed?"
-            raise InputError(files[output.record], output.channel, problem)
+            file, name, record = files[output.record], output.channel, records[output.record]
+            turned = next((one for one in CONTROL_NAMES if RATE[one] == name), None)
+            if turned is not None and _surface_is_reversed(rig, record, turned):
+                problem = f"turns {name} against that of {rig.name}: is its sign reversed?"
+                raise InputError(file, surface_channel(turned), problem)
+            raise InputError(file, name, problem)
+
+
+def _surface_is_reversed(rig: Rig, record: Record, control: ControlName) -> bool:
+    """Tell whether a rate against the model's is due to its surface, not to its own sign.
+
+    So it is if the rate agrees with the attitude. Without the attitude, if the surface moves
+    against the command of the rig's gearing at the measured deflection.
+    """
+    name = surface_channel(control)
+    if name not in record:
+        return False
+    ratio = rate_ratio(_columns(record), RATE[control])
+    if ratio is not None:
+        return ratio > 0.0
+    moved = next((n for n in _signals(record, control) if not n.endswith("_N")), None)
+    points = surface_points(rig, control) if control in rig.controls else None
+    if moved is None or points is None or PRESSURE not in record:
+        return False
+    command = replay_surface(rig, control, record[moved], record[PRESSURE])
+    return plausible.move_oppositely(np.interp(command, *points), record[name])
 
 
 def spoiled(record: Record, control: ControlName, file: str) -> list[str]:
@@ -259,17 +309,6 @@ def check_trim(trim_speed_m_per_s: float, record: Record, file: object) -> None:
 def start_of(record: Record, name: str) -> float:
     """Return the value of a channel at the start of a record, in its unit."""
     return float(np.median(record[name][:SHORT_FRAMES]))
-
-
-def _check_force_unit(record: Record, control: ControlName, file: object) -> None:
-    """Raise InputError if the force, by gradient and deflection, is in pounds."""
-    names = [channel(control, q) for q in ("force", "computed", "gradient")]
-    if any(name not in record for name in names):
-        return
-    ratio = plausible.force_ratio(*(record[name] for name in names))
-    if ratio is not None and plausible.in_pounds(ratio):
-        problem = f"is {ratio:.2f} of what deflection and gradient say: it is in pounds"
-        raise InputError(file, names[0], problem)
 
 
 ALTITUDE, CALIBRATED, PATH = "altitude_m", "calibrated_airspeed_m_per_s", "flight_path_rad"

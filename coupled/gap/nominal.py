@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from coupled.errors import InputError, nearest
-from coupled.gap.checks import at_rate_of, check_record, trimmed
+from coupled.gap.checks import at_rate_of, check_record, check_units, trimmed
 from coupled.gap.effects.effect import (
     BY_REGRESSOR,
     Effect,
@@ -284,6 +284,8 @@ def fit_nominal(
     Raises InputError if a record is of another rig, or if no record depends on a key.
     """
     rig = as_driven(rig, list(records.values()), control) if control in rig.controls else rig
+    for file, record in records.items():
+        check_units(rig, record, control, file)
     filed, rig = rig, _flown_as_recorded(rig, records, keys)
     for file, record in records.items():
         check_record(rig, record, control, file)

@@ -34,6 +34,7 @@ from coupled.gap.checks import (
     check_moved_by_pilot,
     check_record,
     check_trim,
+    check_units,
     motion_alone,
     spoiled,
     trim_speed,
@@ -109,6 +110,8 @@ def prepare(
         rig = at_rate_of(rig, records)
     each = list(records.values())
     rig = as_driven(rig, each, control) if control in rig.controls else rig
+    for file, record in records.items():
+        check_units(rig, record, control, file)
     rig, trim = trimmed(rig, records)
     for file, record in records.items():
         check_record(rig, record, control, file, moved=part.own)
@@ -124,7 +127,7 @@ def prepare(
     ]
     if not outputs:
         raise InputError(next(iter(records)), "", _too_little(rig, control, judged.readers))
-    check_against_model(outputs, rig, list(records))
+    check_against_model(outputs, rig, list(records), each)
     left_out = [why for one in live for why in one.left_out]
     for file, record in records.items() if part.own else ():
         left_out += spoiled(record, control, file)

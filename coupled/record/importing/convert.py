@@ -84,7 +84,7 @@ def import_log(
         logged[name] = kept[np.isfinite(kept) & own.inside()]
         if logged[name].size < 2:
             raise InputError(log.file, channel.source, "has fewer than two numbers in this span")
-    judged = judge(record, logged, rig, main.file)
+    judged = judge(record, logged, grid.frame_time_s, rig, main.file)
     record |= {name: np.full(grid.frames, value) for name, value in constants.items()}
     names = [name for name in named_in(whole_map) if name in record]
     channels = {

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.errors import InputError
-from coupled.record.channels import CONTROL_NAMES, channel
+from coupled.record.channels import CONTROL_NAMES, TIME, channel
 from coupled.record.importing import plausible
+from coupled.record.importing.redundant import feel_pressure, other_units, reversed_rates
 from coupled.rig.equations import specified_gradient
 from coupled.rig.parameters import Control
 from coupled.rig.rig import Rig
@@ -30,15 +31,26 @@ class Judged:
 
 
 def judge(
-    record: Mapping[str, Floats], logged: Mapping[str, Floats], rig: Rig | None, file: object
+    record: Mapping[str, Floats],
+    logged: Mapping[str, Floats],
+    time_s: Floats,
+    rig: Rig | None,
+    file: object,
 ) -> dict[str, Judged]:
     """Return {channel: figures and doubts}.
 
-    `record` are the channels on its frames, shape (frames,); `logged` the same before any
-    interpolation, which would hide a copy or a quantisation. Raises InputError for values that are
-    impossible on this rig.
+    `record` are the channels on its frames at `time_s`, shape (frames,); `logged` the same before
+    any interpolation, which would hide a copy or a quantisation. Raises InputError for values that
+    are impossible on this rig.
     """
-    pairs = _by_others(record, rig, file)
+    timed = {TIME: time_s, **record}
+    units = other_units(timed, rig)
+    right = {name: values * units[name].factor for name, values in record.items() if name in units}
+    pairs = _by_others({**record, **right}, rig, file)
+    for name, one in units.items():
+        _add(pairs, name, f"looks like {one.unit}")
+    for name, angle in reversed_rates(timed).items():
+        _add(pairs, name, f"moves against {angle}: sign?")
     found = {}
     for name, values in record.items():
         raw = logged[name]
@@ -48,7 +60,7 @@ def judge(
         twin = plausible.copy_of(name, logged)
         doubts += [f"copy of {twin}"] if twin else []
         size = plausible.size_doubt(name, values)
-        doubts += [size] if size else []
+        doubts += [size] if size and name not in units else []
         doubts += pairs.get(name, [])
         rms = float(np.sqrt(np.mean(np.square(values))))
         extremes = float(values.min()), float(values.max())
@@ -112,7 +124,10 @@ def _by_others(record: Mapping[str, Floats], rig: Rig | None, file: object) -> d
     air = ("dynamic_pressure_Pa", "true_airspeed_m_per_s", "altitude_m")
     if all(name in record for name in air):
         pressure, airspeed, altitude = (record[name] for name in air)
-        _add(doubts, air[0], plausible.pressure_doubt(pressure, airspeed, altitude))
+        ratio = plausible.pressure_ratio(pressure, airspeed, altitude)
+        low, high = plausible.SAME_PRESSURE
+        if ratio is not None and not low < ratio < high:
+            _add(doubts, air[0], f"is {ratio:.3g} of ½ρV² by airspeed and altitude")
     return doubts
 
 
@@ -158,12 +173,7 @@ def _force(
 
 def _filed_gradient(record: Mapping[str, Floats], data: Control | None) -> Floats | None:
     """Return the gradient of a rig's table at q̄; without q̄ only if it is constant."""
-    if data is None:
+    pressure = feel_pressure(record, data) if data is not None else None
+    if data is None or pressure is None:
         return None
-    if "dynamic_pressure_Pa" in record:
-        return specified_gradient(data.schedule, record["dynamic_pressure_Pa"])
-    segments = data.schedule.segments
-    first, *rest = segments[0]
-    if len(segments) > 1 or any(each != first for each in rest):
-        return None
-    return np.full(next(iter(record.values())).size, first)
+    return specified_gradient(data.schedule, pressure)

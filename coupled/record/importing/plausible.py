@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.record.channels import CONTROL_NAMES
-from coupled.units import POUND_N, PSF_Pa
+from coupled.units import POUND_N, FOOT_m, GRAVITY_m_per_s2
 
 Floats = NDArray[np.float64]
 FAR_BEYOND = 3.0  # times the travel, from which the unit is wrong
@@ -25,6 +25,7 @@ FAR_RATIO = 2.0  # of a force over its spring's, from which a diagnosis refuses 
 _FORCES = {"kgf or daN": 9.9, "ozf": POUND_N / 16.0, "kN": 1e3}
 _LENGTHS = {"in": 0.0254, "cm": 0.01, "mm": 1e-3, "ft": 0.3048}
 _ANGLE = {"deg": np.pi / 180.0}
+SAME_PRESSURE = (0.7, 1.4)  # q̄ over ½ρV²: the air is not the standard one, and q̄ may be impact
 TOGETHER = 0.6  # correlation of a force with a spring's, from which its ratio shows its unit
 WHOLE_RANGE = 0.9  # of the range: jump of a position that wraps
 # Half and twice of these two change no test of imports and sensors.
@@ -207,7 +208,12 @@ def force_ratio(force_N: Floats, deflection: Floats, gradient: Floats) -> float 
 
 
 def bend_sign(force_N: Floats, computed: Floats, deflection: Floats) -> int:
-    """Return the sign of the slope of δ − δc on F; 0 if they hardly correlate.
+    """Return the sign of `bend_slope`."""
+    return int(np.sign(bend_slope(force_N, computed, deflection)))
+
+
+def bend_slope(force_N: Floats, computed: Floats, deflection: Floats) -> float:
+    """Return the slope of δ − δc on F, d/N; 0 if they hardly correlate.
 
     A structure bends under a pull, so that δ = δc + K·F with K > 0: −1 means that δ and δc are
     exchanged, or have different scales. The part correlated with the rate of the motion, by a late
@@ -220,11 +226,11 @@ def bend_sign(force_N: Floats, computed: Floats, deflection: Floats) -> int:
     scale = float(np.sqrt((left @ left) * (pull @ pull)))
     # The difference of two equal channels is rounding only.
     if float(np.std(apart)) <= ROUNDING * float(np.std(computed)) or scale == 0.0:
-        return 0
+        return 0.0
     if float(np.std(left)) < BESIDE_A_DELAY * float(np.std(apart - left)):
-        return 0
-    share = float(left @ pull) / scale
-    return int(np.sign(share)) if abs(share) >= TOGETHER else 0
+        return 0.0
+    shared = float(left @ pull)
+    return shared / float(pull @ pull) if abs(shared) >= TOGETHER * scale else 0.0
 
 
 def unit_doubt(ratio: float, turned: bool) -> str | None:
@@ -328,20 +334,18 @@ def _level_doubt(median: float) -> str | None:
         return "is 0 in level flight: offset 1?"
     if median < -0.5:
         return "is -1 in level flight: sign?"
+    for unit, size in (("m/s²", GRAVITY_m_per_s2), ("ft/s²", GRAVITY_m_per_s2 / FOOT_m)):
+        if abs(median / size - 1.0) < 0.1:
+            return f"is {median:.3g} in level flight: looks like {unit}"
     return f"is {median:.3g} in level flight" if median > 5.0 else None
 
 
-def pressure_doubt(pressure_Pa: Floats, airspeed_m_per_s: Floats, altitude_m: Floats) -> str | None:
-    """Return a doubt if q̄ differs from ½·ρ·V² of airspeed and altitude, standard atmosphere."""
+def pressure_ratio(
+    pressure_Pa: Floats, airspeed_m_per_s: Floats, altitude_m: Floats
+) -> float | None:
+    """Return q̄ over ½·ρ·V² of airspeed and altitude, standard atmosphere; None at rest."""
     kelvin = np.maximum(288.15 - 0.0065 * np.clip(altitude_m, -500.0, 11_000.0), 216.65)
     density = 1.225 * (kelvin / 288.15) ** 4.2559
     density *= np.exp(-np.maximum(altitude_m - 11_000.0, 0.0) / 6341.6)
-    expected = 0.5 * density * airspeed_m_per_s**2
-    if not np.median(expected) > 50.0:  # at rest there is nothing to compare
-        return None
-    ratio = float(np.median(pressure_Pa) / np.median(expected))
-    if 0.7 < ratio < 1.4:
-        return None
-    if 0.7 < ratio * PSF_Pa < 1.4:
-        return "looks like psf"
-    return f"is {ratio:.3g} of ½ρV² by airspeed and altitude"
+    expected = float(np.median(0.5 * density * airspeed_m_per_s**2))
+    return float(np.median(pressure_Pa)) / expected if expected > 50.0 else None

@@ -375,13 +375,6 @@ def test_figures_on_white_noise_raise_no_doubt() -> None:
     assert plausible.quantised_step(noise) is None
     assert plausible.quantised_step(np.round(noise, 2)) is None
     assert plausible.spikes(noise) == []
-    assert (
-        plausible.pressure_doubt(noise * 0 + 10195.0, noise * 0 + 149.7, noise * 0 + 3000) is None
-    )
-    assert (
-        plausible.pressure_doubt(noise * 0 + 213.0, noise * 0 + 149.7, noise * 0 + 3000)
-        == "looks like psf"
-    )
 
 
 def test_a_sensor_that_saturates_on_both_sides_is_clipped() -> None:
