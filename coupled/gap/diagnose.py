@@ -118,10 +118,6 @@ def parts_of(
             raise InputError(rig.name, "--control", problem)
         return {Part("column", own=False): records}, ()
     if control is not None:
-        if control in rig.controls and not _judges(rig, records, control):
-            needed = ", ".join(channel(control, one) for one in ("force", "computed", "deflection"))
-            problem = f"no stage of the {control} can be judged without its channels: {needed}"
-            raise InputError(next(iter(records)), "--control", problem)
         return {Part(control): records}, ()
     moved = {
         name: {file: one for file, one in records.items() if moves(rig, one, name)}
