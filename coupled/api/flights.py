@@ -197,7 +197,7 @@ def manoeuvre_of(
         record_properties=tuple(terms.get("record_properties", ())),
         name=name,
         gradient=_laws(gradient, rig, name),
-    )
+    ).begun()
 
 
 def _laws(given: Gradients | None, rig: Rig, name: str) -> Mapping[ControlName, Law]:

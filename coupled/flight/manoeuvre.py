@@ -201,6 +201,15 @@ class Manoeuvre:
         """Return this manoeuvre with the rig in one of the configurations."""
         return replace(self, rig=configure(self.rig, configuration))
 
+    def begun(self) -> Manoeuvre:
+        """Return this manoeuvre; raises InputError for a pilot who begins after its end."""
+        for control, pilot in self.pilots.items():
+            key, time_s = pilot.begins(control)
+            if time_s >= self.duration_s:
+                problem = f"is {time_s:g}; give less than duration_s = {self.duration_s:g}, when"
+                raise InputError(self.file, f"pilot.{control}.{key}", f"{problem} the run ends")
+        return self
+
     def _check_kind(self) -> None:
         """Refuse keys of a bench for a rig with an aircraft, and the reverse."""
         rig, file, bench = self._rig_name, self.file, self.bench

@@ -144,7 +144,7 @@ def _manoeuvre(run: RunFile, file: Path, pilots: Any, case: Case, index: int) ->
             case.label,
             run.card,
             Source(file, rig_file, case.rig),
-        )
+        ).begun()
     except InputError as error:
         if error.key.removeprefix("pilot.") in case.pilot:
             raise InputError(error.file, f"case[{index}].{error.key}", error.problem) from None

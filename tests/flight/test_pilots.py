@@ -8,10 +8,22 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+import coupled
 from coupled.errors import InputError
 from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import Manoeuvre
-from coupled.flight.pilot import Attitude, Track
+from coupled.flight.pilot import (
+    Attitude,
+    Clamp,
+    Doublet,
+    ForceTable,
+    FrequencySweep,
+    Pilot,
+    Ramp,
+    Step,
+    ThreeTwoOneOne,
+    Track,
+)
 from coupled.flight.pilot.crossover import (
     Acting,
     Compensation,
@@ -280,3 +292,23 @@ def test_a_pilot_who_cannot_be_is_refused(tmp_path: Path, pilot: str, key: str, 
     assert f"pilot.column.{key}" in str(caught.value)
     assert says in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "pilot",
+    [
+        Step(force_N=9.0, start_s=3.0),
+        Ramp(force_N=9.0, ramp_s=1.0, start_s=3.0),
+        Doublet(force_N=9.0, half_period_s=1.0, start_s=3.0),
+        ThreeTwoOneOne(force_N=9.0, unit_s=1.0, start_s=3.0),
+        FrequencySweep(force_N=9.0, duration_s=1.0, start_s=3.0),
+        Clamp(deflection_m=0.01, start_s=3.0),
+        ForceTable(time_s=[1.0, 2.0], force_N=[0.0, 9.0], start_s=2.0),
+        Attitude(gain_N_per_rad=9.0, start_s=3.0),
+        Track(crossover_rad_per_s=1.5, start_s=3.0),
+    ],
+)
+def test_a_pilot_who_begins_after_the_end_is_refused(pilot: Pilot) -> None:
+    with pytest.raises(InputError, match=r"start_s: is 3; give less than duration_s = 3") as error:
+        coupled.fly("report-column", column=pilot, duration_s=3.0)
+    assert error.value.key == "pilot.column.start_s"

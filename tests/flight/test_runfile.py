@@ -43,6 +43,24 @@ def test_every_shipped_run_reads_and_has_a_card(name: str) -> None:
         ('kind = "step"', 'kind = "stepp"', "pilot.column.kind", "did you mean step?"),
         ("force_N = 30.0", "force_lb = 30.0", "pilot.column.force_lb", "give force_N"),
         ("force_N = 30.0", "force_N = nan", "pilot.column.force_N", "finite"),
+        (
+            "force_N = 30.0",
+            "force_N = 30.0\nstart_s = 4.0",
+            "pilot.column.start_s",
+            "is 4; give less than duration_s = 4, when the run ends",
+        ),
+        (
+            'kind = "step"\nforce_N = 30.0',
+            'kind = "table"\ntime_s = [5.0, 6.0]\nforce_N = [0.0, 9.0]',
+            "pilot.column.time_s",
+            "is 5; give less than duration_s = 4",
+        ),
+        (
+            "force_N = 30.0\n",
+            'force_N = 30.0\n[[case]]\nlabel = "a"\npilot = { "column.start_s" = 9.0 }\n',
+            "case[0].pilot.column.start_s",
+            "is 9; give less than duration_s = 4",
+        ),
         ("[pilot.column]", "[pilot.wheel]", "pilot.wheel", "the rig has no wheel"),
         ("[pilot.column]", "[pilots.column]", "pilots", "did you mean pilot?"),
         (

@@ -82,6 +82,10 @@ class Pilot(Given):
         given = {key: None for key in file_keys(type(self), "m") if key in self.model_fields_set}
         known_keys(given, self.keys_on(control), file, f"pilot.{control}")
 
+    def begins(self, control: ControlName) -> tuple[str, float]:
+        """Return the key that gives when the pilot begins, and that time in s; 0 by default."""
+        return "start_s", self.start_s if "start_s" in self.model_fields_set else 0.0
+
     def act(self, rig: Rig, control: ControlName, start: Start) -> Action:
         """Return the pilot's action on a rig's control."""
         raise NotImplementedError

@@ -60,11 +60,21 @@ class ForceTable(Pilot):
         keys = (f"{place}.time_s", f"{place}.force_N")
         _check_rows(np.array(self.time_s), np.array(self.force_N), file, keys, 0)
 
+    def begins(self, control: ControlName) -> tuple[str, float]:
+        """Return the key that gives when the table begins, and that time in s."""
+        first = float(self._rows(control)[0][0])
+        key = "file" if self.file else "time_s"
+        return key if first > self.start_s else "start_s", self.start_s + first
+
+    def _rows(self, control: ControlName) -> tuple[Floats, Floats]:
+        """Return the times in s and the forces in N."""
+        if self.file:
+            return read_force_table(Path(self.file), channel(control, "force"))
+        return np.array(self.time_s), np.array(self.force_N)
+
     def act(self, rig: Rig, control: ControlName, start: Start) -> Action:
         """Return the table's force."""
-        times, forces = np.array(self.time_s), np.array(self.force_N)
-        if self.file:
-            times, forces = read_force_table(Path(self.file), channel(control, "force"))
+        times, forces = self._rows(control)
 
         def force(t: Floats) -> Floats:
             found = np.interp(t - self.start_s, times, forces, left=0.0, right=0.0)
