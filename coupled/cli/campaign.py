@@ -20,7 +20,7 @@ from coupled.cli.app import (
 from coupled.cli.process import was_interrupted
 from coupled.cli.progress import progress
 from coupled.cli.reporting import ReportOption, check_report, say_report, write_report
-from coupled.cli.rigs import say_guesses
+from coupled.cli.rigs import say_doubts
 from coupled.cli.terminal import check_json, err, keep_json, out, print_json, say
 from coupled.errors import InputError
 from coupled.files import check_target, write_text
@@ -64,7 +64,7 @@ def check(
         check_target(junit, inputs)
     own = [*inputs, *([junit] if junit else [])]
     check_json(json_file, [*own, *check_report(report, own)])
-    notes = [say_guesses(rig) for rig in {s.rig.name: s.rig for s, *_ in found}.values()]
+    notes = [say_doubts(rig) for rig in {s.rig.name: s.rig for s, *_ in found}.values()]
     with progress() as advance:
         checked = check_runs(found, advance)
     if was_interrupted():  # the last run is incomplete

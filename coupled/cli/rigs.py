@@ -85,12 +85,15 @@ def say_guesses(rig: Rig, controls: Collection[str] = ()) -> str:
 
 
 def say_stale(rig: Rig) -> None:
-    """Print on standard error what has changed since a rig's calibrations."""
+    """Print on standard error what has changed since a rig's calibrations, and doubtful q̄."""
     from coupled.calibration.assumed import stale
+    from coupled.rig.bounds import pressure_doubts
 
     for name, control in rig.controls.items():
         for change in stale(control):
             err.print(f"[yellow]stale calibration:[/] {name}: {escape(change)}", soft_wrap=True)
+    for doubt in pressure_doubts(rig):
+        say_note(doubt)
 
 
 def instruments(control: str, errors: Sequence[str] | None) -> Instruments:

@@ -28,6 +28,7 @@ from coupled.record.channels import (
     unit_of,
 )
 from coupled.results import Result
+from coupled.rig.bounds import check_bounds
 from coupled.rig.curves import check_curves
 from coupled.rig.guesses import check_guesses
 from coupled.rig.parameters import (
@@ -282,6 +283,7 @@ def _check_control(rig: Rig, name: str, control: Control, file: object) -> None:
     _check_dynamics(rig, control, file, path)
     _check_inertia(control, file, path, d)
     _check_schedule(control, file, path, d)
+    check_bounds(rig, control, file, path, d)
     _check_converters(control, file, path, d)
     _check_tolerance(control, file, path, d)
     check_guesses(control, file, path, d)

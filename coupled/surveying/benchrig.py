@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from coupled.display import System, in_system
 from coupled.errors import InputError, nearest
 from coupled.record.channels import ControlName, unit_of
+from coupled.rig.bounds import REACHED
 from coupled.surveying.draft import HOW_TO_SETTLE, BEND_m_per_N, RIM_m, control_lines, kind_of
 from coupled.surveying.fromlog import LogNumbers
 from coupled.units import parse_unit
@@ -75,6 +76,10 @@ def answer(text: str, asked: Question, system: System) -> float:
     if not least < value < 1e6:
         above = "above 0" if least == 0.0 else "of 0 or more"
         raise InputError("new rig", asked.name, f"{text!r} is no number {above}, in {shown.unit}")
+    if asked.name == "travel" and value > REACHED[asked.unit]:
+        most = f"{shown.factor * REACHED[asked.unit]:.3g} {shown.unit}"
+        problem = f"{text!r} is in another unit: a hand reaches {most} at most"
+        raise InputError("new rig", asked.name, problem)
     return value
 
 

@@ -13,6 +13,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 from coupled.record.channels import SURFACES, ControlName, unit_of
+from coupled.rig.bounds import pressure_at
 from coupled.surveying.survey import Surveyed
 
 BEND_m_per_N = 9.136e-5  # 0.016 in/lb, the report's column
@@ -135,7 +136,7 @@ def _flight(found: Surveyed, folder: str) -> list[str]:
 
 
 def _control(control: ControlName, guess: Hardware, found: Surveyed) -> list[str]:
-    low, high = _pressure(found.slowest), _pressure(found.fastest)
+    low, high = pressure_at(found.slowest), pressure_at(found.fastest)
     bend, origin = {
         "column": (BEND_m_per_N, "K of Cleveland's column"),
         "wheel": (BEND_m_per_N / RIM_m, "K of Cleveland's column over the rim's radius"),
@@ -232,8 +233,3 @@ def control_lines(
         "gradient = true",
         f"bend_{d}_per_N = {bend:.4g}  # K as the host assumes it",
     ]
-
-
-def _pressure(calibrated_m_per_s: float) -> float:
-    """Return q̄ in Pa at a calibrated airspeed, without compressibility."""
-    return 0.5 * 1.225 * calibrated_m_per_s**2

@@ -156,6 +156,7 @@ def test_an_answer_may_have_its_own_unit(text: str, name: str, value: float) -> 
     ("words", "said"),
     [
         (("--bench", "a.toml", "--set", "mass=4lb"), "mass: 'lb' is no unit of it"),
+        (("--bench", "a.toml", "--set", "travel=4"), "travel: '4' is in another unit: a hand re"),
         (("--bench", "a.toml", "--set", "travel=0"), "travel: '0' is no number above 0, in m"),
         (("--bench", "a.toml", "--set", "mass=4", "--set", "mass=5"), "gives mass twice"),
         (("--bench", "a.toml", "--set", "weight=3"), "--set: 'weight=3' is no NAME=VALUE"),

@@ -271,7 +271,9 @@ def test_a_rising_law_is_solved_on_its_own_segment(
 def test_a_force_through_a_damping_of_several_segments_settles_at_its_speed() -> None:
     """Without springs c·v + g(v) = F at the end; the first segment is 40 times as steep as c."""
     curve = FrictionCurve(
-        rate=[0.0, 0.002, 0.02, 0.05], force=[0.0, 6.0, 7.0, 4.0], force_push=[0.0, 3.0, 3.0, 9.0]
+        rate=[0.0, 0.002, 0.02, 0.05, 0.06],
+        force=[0.0, 6.0, 7.0, 4.0, 4.0],
+        force_push=[0.0, 3.0, 3.0, 9.0, 9.0],
     )
     table = {
         "rate_m_per_s": curve.rate,
