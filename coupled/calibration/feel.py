@@ -27,6 +27,7 @@ from scipy.stats import t as student
 from coupled.calibration.aircraftdata import motion_of, read_rows
 from coupled.errors import InputError
 from coupled.record.channels import CONTROL_NAMES, ControlName, channel, unit_of
+from coupled.record.importing.plausible import check_size, held_extreme, size_doubt
 from coupled.record.record import Record
 
 Floats = NDArray[np.float64]
@@ -47,6 +48,15 @@ class Sweep:
     force: Floats
     pressure: Floats
     motion: Floats
+
+    def doubts(self, control: ControlName) -> list[str]:
+        """Return doubts about the forces: a gauge that saturates, another unit."""
+        name = channel(control, "force")
+        end_N, size = held_extreme(self.force[self.motion != 0.0]), size_doubt(name, self.force)
+        found = [] if size is None else [f"{name}: {size}"]
+        if end_N is not None:
+            found.append(f"{name}: clipped at {end_N:.4g}; friction and curve are wrong there")
+        return found
 
     @property
     def far(self) -> NDArray[np.bool_]:
@@ -105,7 +115,7 @@ def read_sweep(path: Path, control: ControlName) -> Sweep:
         for q in np.unique(pressure):
             motion[pressure == q] = motion_of(deflection[pressure == q])
     found = Sweep(deflection, force, pressure, motion)
-    _check(path, [row.number for row in rows], found)
+    _check(path, [row.number for row in rows], found, control)
     return found
 
 
@@ -152,11 +162,11 @@ def sweep_of_record(record: Record, control: ControlName, file: Path) -> Sweep:
     one_side = [np.min(record[name][rows]) * np.max(record[name][rows]) > 0.0 for rows in parts]
     motion = np.where(one_side, motion_of(deflection), 0.0)
     found = Sweep(deflection, force, level, motion)
-    _check(file, [int(rows[0]) + 2 for rows in parts], found)
+    _check(file, [int(rows[0]) + 2 for rows in parts], found, control)
     return found
 
 
-def _check(path: Path, numbers: Sequence[int], sweep: Sweep) -> None:
+def _check(path: Path, numbers: Sequence[int], sweep: Sweep, control: ControlName) -> None:
     """Refuse readings that do not determine friction and curve; `numbers` are their rows."""
     outward = sweep.motion * np.sign(sweep.deflection)
     furthest = int(np.argmax(np.abs(sweep.deflection)))
@@ -179,6 +189,7 @@ def _check(path: Path, numbers: Sequence[int], sweep: Sweep) -> None:
     if float(np.sum(pull)) <= 0.0:
         problem = "has forces against the deflections, or none; a pull is positive in both"
         raise InputError(path, f"row {numbers[int(np.argmin(pull))]}", problem)
+    check_size(channel(control, "deflection"), sweep.deflection, path)
 
 
 def fit_feel(sweep: Sweep) -> Feel:
@@ -301,9 +312,10 @@ def feel_text(feel: Feel, control: ControlName, source: str) -> str:
         return "[" + ", ".join(repr(float(f"{value:.5g}") + 0.0) for value in values) + "]"
 
     rows = ",\n  ".join(listed(row) for row in feel.force)
+    doubts = "".join(f"# Doubtful: {doubt}.\n" for doubt in feel.sweep.doubts(control))
     return f"""# Breakout, friction and curve of {source}, for a rig file in place of its own keys.
 # The residual of the readings is {feel.rms_N:.3g} N RMS.
-
+{doubts}
 [controls.{control}.loader]
 breakout_N = {feel.breakout_N:.4g}{interval(feel.breakout_half_width_N)}
 friction_N = {feel.friction_N:.4g}{interval(feel.friction_half_width_N)}

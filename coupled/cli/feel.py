@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from coupled.cli.progress import progress
-from coupled.cli.terminal import say
+from coupled.cli.terminal import say, say_note
 from coupled.display import System, in_system
 from coupled.files import write_text
 
@@ -34,7 +34,7 @@ def keep_feel(
         save(draw_sweep(feel, control, source, units), outputs.at(file.with_suffix(".png")))
 
 
-def print_feel(feel: Feel, file: Path, units: System = "si") -> None:
+def print_feel(feel: Feel, control: ControlName, file: Path, units: System = "si") -> None:
     """Print what was found, the files, and the next step."""
     newtons = in_system("N", units)
     for what, value, half in (
@@ -47,6 +47,8 @@ def print_feel(feel: Feel, file: Path, units: System = "si") -> None:
     segments = len(feel.deflection) - 1
     sides = "for both sides" if feel.deflection[0] == 0.0 else "over both sides"
     say(f"{'curve':13}{segments} segments {sides}, at {len(feel.pressure)} q̄")
+    for doubt in feel.sweep.doubts(control):
+        say_note(doubt)
     plot = file.with_suffix(".png")
     say(f"written: {file}, {plot}")
     say(f"next: compare them in {plot.name}, then put the keys of {file.name} in a rig file")

@@ -139,7 +139,7 @@ def _convert(
         say(f"record: {path}  ({len(record)} rows, {len(record.channels)} channels)")
         say(f"manifest: {manifest_path(path)}")
         if feel is not None and found is not None:
-            print_feel(found[1], feel)
+            print_feel(found[1], found[0], feel)
     print_json(table, json_file)
 
 

@@ -114,7 +114,7 @@ def feel(
     found = fit_feel(read_sweep(readings, named))
     with Outputs() as outputs:
         keep_feel(found, named, shown(readings.name), file, outputs, units)
-    print_feel(found, file, units)
+    print_feel(found, named, file, units)
 
 
 def _run_for(rig: str, control: str, file: Path) -> str:

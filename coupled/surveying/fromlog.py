@@ -21,7 +21,7 @@ from scipy.optimize import nnls
 
 from coupled.errors import InputError
 from coupled.record.channels import ControlName, channel
-from coupled.record.importing.plausible import size_doubt
+from coupled.record.importing.plausible import check_size
 from coupled.record.record import Record
 from coupled.record.samples import check_samples
 
@@ -74,9 +74,7 @@ def numbers_from_log(record: Record, control: ControlName, file: object) -> LogN
     if travel <= 0.0 or float(np.ptp(force)) <= 0.0:
         raise InputError(file, there[0], f"the {control} does not move, or no force acts on it")
     for name in there:
-        if (doubt := size_doubt(name, record[name])) is not None:
-            most = float(np.max(np.abs(record[name])))
-            raise InputError(file, name, f"reaches {most:.3g}, and {doubt}; give it in its unit")
+        check_size(name, record[name], file)
     columns, found, errors = _fitted(record.time_s, x, force, travel, file)
     values = dict(zip(columns, found, strict=True))
     limits = dict.fromkeys(columns, 0.0)

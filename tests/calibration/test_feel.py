@@ -150,6 +150,37 @@ def test_readings_that_decide_nothing_are_one_line(
     assert said in refused.value.problem
 
 
+@pytest.mark.parametrize(
+    ("heads", "factor", "reaches"),
+    [("deflection_m,force_N", 1e3, "177"), ("force_N,deflection_m", 1.0, "285")],
+)
+def test_deflections_in_another_unit_or_exchanged_are_refused(
+    tmp_path: Path, heads: str, factor: float, reaches: str
+) -> None:
+    at, motion = swept(-NODES[-1], NODES[-1])
+    felt = np.sign(at) * (BREAKOUT_N + np.interp(np.abs(at), NODES, FORCES[3000.0]))
+    rows = np.stack((factor * at, felt + FRICTION_N * motion), axis=1)
+    path = tmp_path / "sweep.csv"
+    np.savetxt(path, rows, delimiter=",", header=heads, comments="")
+    with pytest.raises(InputError) as refused:
+        read_sweep(path, "column")
+    assert refused.value.key == "column_deflection_m"
+    assert f"reaches {reaches}, and looks like mm" in refused.value.problem
+
+
+def test_a_gauge_that_saturates_is_doubtful(tmp_path: Path) -> None:
+    column_sweep(tmp_path)
+    head, *rows = (tmp_path / "sweep.csv").read_text(encoding="utf-8").split()
+    cells = [row.split(",") for row in rows]
+    cut = [f"{q},{d},{np.clip(float(force), -60.0, 60.0):g}" for q, d, force in cells]
+    (tmp_path / "cut.csv").write_text("\n".join([head, *cut]) + "\n", encoding="utf-8")
+    assert read_sweep(tmp_path / "sweep.csv", "column").doubts("column") == []
+    done = coupled(tmp_path, "new", "feel", "cut.csv", "cut.toml")
+    assert done.returncode == 0
+    assert "column_force_N: clipped at 60" in done.stderr
+    assert "# Doubtful: column_force_N: clipped at 60" in (tmp_path / "cut.toml").read_text("utf-8")
+
+
 def test_the_command_writes_a_schedule_that_a_rig_takes(tmp_path: Path) -> None:
     column_sweep(tmp_path)
     done = coupled(tmp_path, "new", "feel", "sweep.csv", "feel.toml")

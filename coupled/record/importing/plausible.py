@@ -1,7 +1,8 @@
 """Plausibility rules for channels, on arrays in SI.
 
 A rule returns its finding, as a few words or a number, or nothing. Findings are doubts for the user
-to judge: for example, a constant q̄ is normal in a bench record.
+to judge: for example, a constant q̄ is normal in a bench record. `check_size` refuses, for readers
+that make numbers of a rig from a channel.
 """
 
 from __future__ import annotations
@@ -12,7 +13,9 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from coupled.errors import InputError
 from coupled.record.channels import CONTROL_NAMES
+from coupled.rig.bounds import REACHED
 from coupled.units import POUND_N, FOOT_m, GRAVITY_m_per_s2
 
 Floats = NDArray[np.float64]
@@ -50,7 +53,6 @@ _BOUNDS: dict[str, tuple[float, float]] = {
 _ANGLES = {"roll_rad": 2.0 * np.pi, "heading_rad": 4.0 * np.pi}
 _SMALL_ANGLE_rad = np.pi / 2.0
 _FASTEST_rad_per_s = 6.0
-_LONGEST_m = 1.0
 
 
 def noise_level(values: Floats, order: int = 4) -> float:
@@ -61,10 +63,8 @@ def noise_level(values: Floats, order: int = 4) -> float:
     """
     if values.size <= order:
         return 0.0
-    power = math.sqrt(
-        math.comb(2 * order, order)
-    )  # of the binomial coefficients, squared and added
-    return float(np.median(np.abs(np.diff(values, order))) / (0.6745 * power))
+    power = math.comb(2 * order, order)  # the sum of the squared binomial coefficients
+    return float(np.median(np.abs(np.diff(values, order))) / (0.6745 * math.sqrt(power)))
 
 
 def is_constant(values: Floats) -> bool:
@@ -93,8 +93,11 @@ def copy_of(name: str, channels: Mapping[str, Floats]) -> str | None:
 
 def clipped_at(values: Floats) -> float | None:
     """Return the extreme at which a noisy channel is constant for five rows or more."""
-    if noise_level(values) == 0.0:
-        return None
+    return None if noise_level(values) == 0.0 else held_extreme(values)
+
+
+def held_extreme(values: Floats) -> float | None:
+    """Return the extreme at which a channel that changes is constant for five rows or more."""
     ends = float(values.max()), float(values.min())
     between = ~np.isin(values, ends)
     still = (np.diff(values) == 0.0) & between[1:]
@@ -302,6 +305,13 @@ def beyond_travel(deflection: Floats, travel: float) -> float | None:
     return most / travel if most > 1.05 * travel + 5.0 * noise_level(deflection) else None
 
 
+def check_size(name: str, values: Floats, file: object) -> None:
+    """Raise InputError for a channel whose size shows another unit; `file` is named."""
+    if (doubt := size_doubt(name, values)) is not None:
+        most = float(np.max(np.abs(values)))
+        raise InputError(file, name, f"reaches {most:.3g}, and {doubt}; give it in its unit")
+
+
 def size_doubt(name: str, values: Floats) -> str | None:
     """Return a doubt about a channel's unit from its size: degrees, millimetres, g less one."""
     low, high = float(values.min()), float(values.max())
@@ -322,10 +332,10 @@ def _largest(name: str) -> tuple[bool, float]:
     if name.endswith("_rad_per_s"):
         return True, _FASTEST_rad_per_s
     if name.endswith("_rad") and "_N_per_" not in name:
-        turns = 2.0 * np.pi if name.startswith("wheel_") else _SMALL_ANGLE_rad
+        turns = REACHED["rad"] if name.startswith("wheel_") else _SMALL_ANGLE_rad
         return True, _ANGLES.get(name, turns)
     length = name.endswith("_m") and "_N_per_" not in name and name != "altitude_m"
-    return False, _LONGEST_m if length else np.inf
+    return False, REACHED["m"] if length else np.inf
 
 
 def _level_doubt(median: float) -> str | None:
