@@ -1,50 +1,32 @@
-"""Numbers of a rig that no machine has, by the ratios between them.
+"""Numbers of a rig that no machine has.
 
-A rig may be of any size, so lengths are compared with its travel. Only the travel of a control of
-an aircraft is compared with the reach of a hand.
+A rig may be of any size, and a length beyond its travel may mean "none". Only the travel of a
+control of an aircraft is compared with the reach of a hand.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 
 import numpy as np
 
 from coupled.errors import InputError
-from coupled.rig.curves import Curve, FrictionCurve
+from coupled.rig.curves import FrictionCurve
 from coupled.rig.parameters import Control
 from coupled.rig.rigdata import RigData
-from coupled.schema import Section, file_keys
 
-# Times the travel: in, deg, cm and mm read as m or rad are 39, 57, 100 and 1000 times too large.
-WRONG_UNIT = 10.0
+WRONG_UNIT = 10.0  # times the q̄ of the flight; psf and hPa read as Pa are 48 and 100 times less
 REACHED = {"m": 1.0, "rad": 2.0 * math.pi}  # of a hand on column and pedals, and on a wheel
 ROUNDING = 1e-9  # of a sum of numbers that cancel
-# Beyond the travel these have no effect, and a fit may leave them there.
-_FREE = ("bend_limit", "ripple_period")
 
 
 def check_bounds(rig: RigData, control: Control, file: object, path: str, d: str) -> None:
-    """Refuse an impossible travel, length, bend or friction curve of a control."""
-    travel, key, loader = control.travel, f"travel_{d}", control.loader
-    unit = "is it in another unit?"
-    if rig.flight is not None and travel > REACHED[d]:
-        problem = f"is {travel:g}: {unit} a hand reaches {REACHED[d]:.3g} {d} at most"
-        raise InputError(file, f"{path}.{key}", problem)
-    most, full_N = WRONG_UNIT * travel, full_force(control)
-    for part in ("loader", "schedule", "sensing", "services"):
-        for where, size in _lengths(getattr(control, part), f"{path}.{part}", d, travel, full_N):
-            if size > most:
-                problem = f"reaches {size:.4g}, {size / travel:.3g} times {key} = {travel:g}: "
-                raise InputError(file, where, f"{problem}{unit} give at most {most:g}")
-    for name in ("bend", "bend_push"):
-        if (bent := (getattr(loader, name) or 0.0) * full_N) > most:
-            problem = f"gives {bent:.3g} {d} at the force of full travel, {full_N:.3g} N, with"
-            problem = f"{problem} {key} = {travel:g}: {unit} give at most {most / full_N:.3g}"
-            raise InputError(file, f"{path}.loader.{name}_{d}_per_N", problem)
-    if loader.friction_curve.nodes:
-        _check_dissipation(control, full_N, file, f"{path}.loader.friction_curve", d)
+    """Refuse an impossible travel or friction curve of a control."""
+    if rig.flight is not None and control.travel > REACHED[d]:
+        problem = f"is {control.travel:g}: a hand reaches {REACHED[d]:.3g} {d} at most"
+        raise InputError(file, f"{path}.travel_{d}", f"{problem}: is it in another unit?")
+    if control.loader.friction_curve.nodes:
+        _check_dissipation(control, file, f"{path}.loader.friction_curve", d)
 
 
 def pressure_at(calibrated_m_per_s: float) -> float:
@@ -79,38 +61,12 @@ def full_force(control: Control) -> float:
     return spring + loader.breakout + loader.friction
 
 
-def _lengths(
-    section: Section, path: str, d: str, travel: float, full_N: float
-) -> Iterator[tuple[str, float]]:
-    """Yield the lengths, or angles, of a section and its curves: key and largest size.
-
-    Of a curve those of its inner nodes, since its ends may lie anywhere, and of its values at full
-    travel, or at its end within it.
-    """
-    keys = file_keys(type(section), d)
-    if isinstance(section, Curve):
-        if section.nodes:
-            of, value, *_ = ((key, key == f"{field}_{d}") for key, field in keys.items())
-            ends = np.array([-1.0, 1.0]) * min(travel if of[1] else full_N, section.nodes[-1])
-            sizes = (of, section.nodes[1:-1]), (value, section.at(ends).tolist())
-            for (key, is_length), given in sizes:
-                if is_length:
-                    yield f"{path}.{key}", max(map(abs, given), default=0.0)
-        return
-    for key, field in keys.items():
-        value = getattr(section, field)
-        if isinstance(value, Section):
-            yield from _lengths(value, f"{path}.{key}", d, travel, full_N)
-        elif key == f"{field}_{d}" and field not in _FREE and value:
-            yield f"{path}.{key}", max(map(abs, value if isinstance(value, list) else [value]))
-
-
-def _check_dissipation(control: Control, full_N: float, file: object, path: str, d: str) -> None:
+def _check_dissipation(control: Control, file: object, path: str, d: str) -> None:
     """Refuse a friction curve that drives the hand, friction and damping included.
 
     Beyond its nodes up to the rate that the force of full travel gives the mass from stop to stop.
     """
-    loader, travel = control.loader, control.travel
+    loader, travel, full_N = control.loader, control.travel, full_force(control)
     curve: FrictionCurve = loader.friction_curve
     rates = np.array(curve.rate)
     push = "force_push_N" if curve.force_push else "force_N"

@@ -104,14 +104,15 @@ def polygon(signal: NDArray[np.float64]) -> NDArray[np.float64]:
 @given(
     slope=st.floats(0.3, 3.0),
     at=st.floats(0.0, 1.0),
-    noise=st.floats(0.0, 0.05),
+    noise=st.floats(0.0, 0.1),
     seed=st.integers(0, 30),
 )
 def test_the_corners_of_a_script_are_seen_where_they_are(
     slope: float, at: float, noise: float, seed: int
 ) -> None:
+    """Of 1500 drawn records none lost a corner of 10 times the noise, 7 one of 7 times."""
     true = trapezoids(slope, at)
-    read = true + noise * np.random.default_rng(seed).standard_normal(len(true))
+    read = true + noise * slope * np.random.default_rng(seed).standard_normal(len(true))
     turns = np.abs(np.diff(polygon(read), 2))
     sharp = np.abs(np.diff(true, 2)) > 0.2 * slope
     beside = np.convolve(sharp, np.ones(5), mode="same") > 0.0
