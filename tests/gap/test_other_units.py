@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -107,17 +105,29 @@ def stiffer(factor: float) -> Rig:
 
 
 @pytest.mark.parametrize(
-    "gap",
+    ("newtons", "unit"), [(1e3, "kN"), (9.80665, "kgf or daN"), (POUND_N, "pounds")]
+)
+def test_a_force_in_a_larger_unit_is_refused(healthy: Record, newtons: float, unit: str) -> None:
+    """In kN the loader and the linkage were "unexplained", without a word on the unit."""
+    record = spoiled(healthy, "column_force_N", 1.0 / newtons)
+    with pytest.raises(InputError, match=f"^r: column_force_N: .* it is in {unit}"):
+        check_units(RIG, record, "column", "r")
+
+
+@pytest.mark.parametrize(
+    ("gradient", "channel", "factor"),
     [
-        *(lambda factor=factor: spoiled(flown(stiffer(factor)), "", 1.0)
-          for factor in (0.225, 0.25, 0.5, 2.0)),
-        lambda: spoiled(flown(RIG), "column_force_N", 0.5),
-        lambda: spoiled(flown(RIG), "pitch_rate_rad_per_s", 0.5),
+        (0.225, "", 1.0),
+        (0.25, "", 1.0),
+        (0.5, "", 1.0),
+        (2.0, "", 1.0),
+        (1.0, "column_force_N", 0.5),
+        (1.0, "pitch_rate_rad_per_s", 0.5),
     ],
-)  # fmt: skip
-def test_a_large_gap_is_no_unit(gap: Callable[[], Record]) -> None:
+)
+def test_a_large_gap_is_no_unit(gradient: float, channel: str, factor: float) -> None:
     """A gradient of 0.225 has the static force of pounds, but bend and damping of the rig."""
-    check_units(RIG, gap(), "column", "r")
+    check_units(RIG, spoiled(flown(stiffer(gradient)), channel, factor), "column", "r")
 
 
 def test_a_reversed_surface_is_named_without_the_attitude(healthy: Record) -> None:

@@ -16,10 +16,11 @@ preserves sharp inputs. It assumes white noise, so the spectra are first divided
 noise's colour, and λ is scaled likewise. A line (`lines`), such as mains hum, is not noise: it is
 subtracted before and added again.
 
-So are the corners of a force that a script or a test stand gives: a smoother rounds one or rings
-beside it, by several times the noise, and dry friction keeps the error of the peak. A corner is a
-change of slope, far above those elsewhere in the signal, that is as large over few frames as over
-many; that of a bend grows with the frames. Two straight lines that meet at it leave noise alone.
+The corners of a scripted force are also subtracted before and added again. A smoother rounds a
+corner or rings beside it, by several times the noise, and dry friction keeps the error of the peak.
+A corner is a change of slope, far above those elsewhere in the signal. The change is as large over
+few frames as over many, whereas the change of slope of a smooth bend grows with the frames. The
+residual of two straight lines that meet at a corner is noise alone.
 """
 
 from __future__ import annotations

@@ -25,7 +25,7 @@ ROUNDING = 1e-9  # of a channel's own spread, for rounding of records in text
 BESIDE_A_DELAY = 0.3  # up to ω·τ = 0.6, more than the delay of any sensor
 FAR_RATIO = 2.0  # of a force over its spring's, from which a diagnosis refuses another rig's file
 # N, and m or rad, in other units; lbf has rules of its own.
-_FORCES = {"kgf or daN": 9.9, "ozf": POUND_N / 16.0, "kN": 1e3}
+FORCES = {"kgf or daN": 9.9, "ozf": POUND_N / 16.0, "kN": 1e3}
 _LENGTHS = {"in": 0.0254, "cm": 0.01, "mm": 1e-3, "ft": 0.3048}
 _ANGLE = {"deg": np.pi / 180.0}
 SAME_PRESSURE = (0.7, 1.4)  # q̄ over ½ρV²: the air is not the standard one, and q̄ may be impact
@@ -250,7 +250,7 @@ def unit_doubt(ratio: float, turned: bool) -> str | None:
     if 1.0 / FAR_RATIO < size < FAR_RATIO:
         return None
     says = f"is {size:.2g} of gradient times deflection"
-    for units, kind in ((_FORCES, "force"), (_ANGLE if turned else _LENGTHS, "deflection")):
+    for units, kind in ((FORCES, "force"), (_ANGLE if turned else _LENGTHS, "deflection")):
         for word, factor in units.items():
             wrong = size * factor if kind == "force" else size / factor
             if abs(wrong - 1.0) < 0.1:

@@ -34,6 +34,7 @@ _TURNS = tuple(RATE[name] for name in ("wheel", "column", "pedals"))
 # Pa, m/s and N in units that are in use; inHg is the conventional one of NIST SP 811.
 _PRESSURES = {"psf": PSF_Pa, "hPa": 100.0, "kPa": 1e3, "inHg": 3386.389, "psi": 144.0 * PSF_Pa}
 _SPEEDS = {"kt": KNOT_m_per_s, "mph": 5280.0 * FOOT_m / 3600.0, "ft/s": FOOT_m, "km/h": 1.0 / 3.6}
+_LARGER_FORCES = {"pounds": POUND_N, **{u: n for u, n in plausible.FORCES.items() if n > 1.0}}
 _CLOSE = 0.1  # tolerance of a ratio, as that of a force over its spring
 _ROUGHLY = 0.25  # tolerance of a force over its spring, with another witness; as of pounds
 _HIGHEST_m = 15_545.0  # 51 000 ft, the highest certified ceiling of transport aircraft
@@ -217,9 +218,8 @@ def _integral(time_s: Floats, values: Floats) -> Floats:
 
 def _slope(signal: Floats, on: Floats) -> float | None:
     """Return the slope of a signal on another, beside a straight line; None if hardly alike."""
-    line = np.linspace(-1.0, 1.0, signal.size)
-    first, second = (y - y.mean() - line * (line @ (y - y.mean())) / (line @ line)
-                     for y in (signal, on))  # fmt: skip
+    line = np.column_stack([np.ones(signal.size), np.linspace(-1.0, 1.0, signal.size)])
+    first, second = (y - line @ np.linalg.lstsq(line, y, rcond=None)[0] for y in (signal, on))
     shared, power = float(first @ second), float(second @ second)
     alike = abs(shared) > _ALIKE * np.sqrt(float(first @ first) * power)
     return shared / power if power > 0.0 and alike else None
@@ -242,14 +242,23 @@ def force_unit(channels: Channels, rig: Rig, control: ControlName) -> OtherUnit 
         ratio = plausible.force_ratio(channels[force], channels[moved[0]], spring)
     elif (pressure := feel_pressure(channels, data)) is not None:
         ratio = _spring_ratio(channels, control, rig, pressure)
-    if ratio is None or not plausible.in_pounds(ratio):
+    unit = None if ratio is None else _larger_force(ratio)
+    if ratio is None or unit is None:
         return None
+    factor = _LARGER_FORCES[unit]
     each = (_bend_ratio(channels, control, data), _damping_ratio(channels, control, data))
     witnesses = [one for one in each if one is not None]
-    close = witnesses or _matching(ratio, {"pounds": POUND_N})
-    if not close or any(one > POUND_N**-0.5 for one in witnesses):
+    close = witnesses or _matching(ratio, {unit: factor})
+    if not close or any(one > factor**-0.5 for one in witnesses):
         return None
-    return OtherUnit("pounds", POUND_N, f"is {ratio:.2f} of what deflection and {source} give")
+    return OtherUnit(unit, factor, f"is {ratio:.2g} of what deflection and {source} give")
+
+
+def _larger_force(ratio: float) -> str | None:
+    """Return the unit, larger than N, of a force that is `ratio` of the expected one, if any."""
+    if plausible.in_pounds(ratio):
+        return "pounds"
+    return _matching(ratio, _LARGER_FORCES)
 
 
 def feel_pressure(channels: Channels, data: Control) -> Floats | None:
