@@ -16,6 +16,7 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from coupled.flight.wrapper import Aircraft, Hook, Wrapper, together
 from coupled.record.channels import SPEED
@@ -41,6 +42,17 @@ class GivenAir(NamedTuple):
     def repeated(self, times: int) -> GivenAir:
         """Return the air of frames that are divided into so many steps."""
         return GivenAir(*(None if one is None else np.repeat(one, times).tolist() for one in self))
+
+    def in_pairs(self) -> GivenAir:
+        """Return the air of frames of twice the length."""
+        each = (None if one is None else in_pairs(np.array(one)).tolist() for one in self)
+        return GivenAir(*each)
+
+
+def in_pairs(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the means of pairs of rows, shape (rows/2 rounded up, ...); a last one stays."""
+    whole = np.concatenate((values, values[-1:])) if len(values) % 2 else values
+    return np.asarray(0.5 * (whole[::2] + whole[1::2]))
 
 
 DRAWN = GivenAir()

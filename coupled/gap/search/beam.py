@@ -409,7 +409,10 @@ def _worth_a_fit(
     initial = None if found.effects else problem.with_initial_contact(fitted)
     if initial is None:
         return fitted, screened
-    screen = Screen(problem, beam.error)
+    # What does not show in the loader does not depend on its contact.
+    apart = {e.name for e in candidates if "loader" not in e.shows_in}
+    same = {name: known for name, known in beam.screen.known.items() if name in apart}
+    screen = Screen(problem, beam.error, same)
     others = screen.best(initial, candidates, beam.worth(initial), many)
     most, more = (max((one.gain for one in some), default=0.0) for some in (screened, others))
     if more - beam.behind(initial) <= most:

@@ -252,8 +252,9 @@ class Screen:
         rig = _with(self.problem, current, effect, _times(self.problem, effect, values, part))
         if rig is None:
             return []
-        now = _residual(self.problem, effect, current.rig)
-        return [_Signature(values, shape, (_residual(self.problem, effect, rig) - now) / part)]
+        ours = touched(self.problem.outputs, [effect])
+        change = np.concatenate([output.change(current.rig, rig) for output in ours])
+        return [_Signature(values, shape, change / part)]
 
     def _refine(self, current: Fit, effects: Sequence[Effect]) -> None:
         """Add signatures of other sizes than the usual ones, of effects that need no flight.

@@ -2,7 +2,9 @@
 
 A loader runs at 2 kHz or more for the pilot's hand. A replay of a record needs only a few steps a
 frame: at 480 Hz a replay of 60 s differs from that at 2 kHz by hundredths of a noise floor, at a
-quarter of the cost. Final fits and all results use the rig's own steps.
+quarter of the cost. Final fits and all results use the rig's own steps. A flight with steps of
+twice the width differs by several noise floors, but the change of the motion by an effect is nearly
+the same: it is used to screen effects (`change`).
 """
 
 from __future__ import annotations
@@ -35,17 +37,16 @@ from coupled.schema import quantity
 
 
 class CoarseRig(Rig):
-    """A rig whose loader may be stepped more widely than the schema of a rig file allows."""
+    """A rig of wide steps; those of its loader may be wider than a rig file allows."""
 
     loader_rate: float = quantity("Hz", COARSE_STEPS_Hz, gt=0)
 
 
-def coarsely_stepped(rig: Rig) -> Rig:
-    """Return a rig whose loader takes no more steps than the search needs."""
-    if rig.loader_rate <= COARSE_STEPS_Hz:
-        return rig
+def coarsely_stepped(rig: Rig) -> CoarseRig:
+    """Return a rig whose loader and aircraft take no more steps than the search needs."""
     given = {name: getattr(rig, name) for name in Rig.model_fields}
-    return CoarseRig.model_construct(**{**given, "loader_rate": COARSE_STEPS_Hz})
+    rate_Hz = min(rig.loader_rate, COARSE_STEPS_Hz)
+    return CoarseRig.model_construct(**{**given, "loader_rate": rate_Hz})
 
 
 Floats = NDArray[np.float64]
@@ -156,7 +157,7 @@ class Output:
     _known: list[tuple[Any, Floats]] = field(default_factory=list, repr=False, compare=False)
 
     def allows_coarse_steps(self, rig: Rig) -> bool:
-        """Tell whether wide steps of the loader change the prediction little against the floor.
+        """Tell whether wide steps change the prediction little against the floor.
 
         They do not for forces up to half of the frame rate, and for floors near zero.
         """
@@ -169,16 +170,23 @@ class Output:
     ) -> Floats:
         """Return measured minus predicted, in floors, shape (frames,), of a part's stretches.
 
-        `coarse`: with wide steps of the loader. `rough`: approximate, for derivatives.
+        `coarse`: with wide steps. `rough`: approximate, for derivatives.
         """
         rig = coarsely_stepped(rig) if coarse and self.stepped else rig
         predict = self.rough if rough and self.rough is not None else self.predict
-        key = (rig.controls, rig.flight, rig.substeps, predict is self.predict)
+        key = (type(rig), rig.controls, rig.flight, predict is self.predict)
         left = next((left for known, left in self._known if known == key), None)
         if left is None:
             left = (self.measured - predict(rig)) / self.floor
             self._known[:] = [*self._known[1 - _KEPT :], (key, left)]
         return left if part == "all" else left[self.rows(part)]
+
+    def change(self, before: Rig, after: Rig) -> Floats:
+        """Return the change of the residual from one rig to another, approximately, in floors."""
+        if self.stage != "airframe":
+            return self.residual(after, coarse=True) - self.residual(before, coarse=True)
+        wide = replace(self, stepped=True)
+        return wide.residual(after, coarse=True) - wide.residual(before, coarse=True)
 
     def under(self, noise: Noise) -> Output:
         """Return the output with `unsure` set for the noise of the signal that drives it."""

@@ -27,7 +27,15 @@ from coupled.gap.noise.noise import Floats, Noise
 from coupled.gap.noise.smooth import smoothed
 from coupled.gap.signals.air import NEEDS_ACROSS, Air, crossing_air, vertical_air
 from coupled.gap.signals.floors import left_noise
-from coupled.gap.signals.output import TRIM, Output, estimate_noise, lasting, spread, white
+from coupled.gap.signals.output import (
+    TRIM,
+    CoarseRig,
+    Output,
+    estimate_noise,
+    lasting,
+    spread,
+    white,
+)
 from coupled.gap.stages.openloop import (
     SLOW,
     Between,
@@ -156,7 +164,10 @@ class Model:
         )
 
     def flown(self, rig: Rig) -> Flown | None:
-        """Return the compared channels and the trim of `rig`; None if it cannot be trimmed."""
+        """Return the compared channels and the trim of `rig`; None if it cannot be trimmed.
+
+        That of a coarse rig is flown coarsely (`fly_open_loop`).
+        """
         return self._flown(rig)[0]
 
     def shots(self, rig: Rig) -> Flown | None:
@@ -169,22 +180,22 @@ class Model:
         The two are flown at once: what compares one of them compares the other too.
         """
         assert rig.flight is not None
-        flight = _in_time(rig)
+        flight, coarse = _in_time(rig), isinstance(rig, CoarseRig)
         # The air is estimated from the recorded motion, so it has the same late time stamps.
         late = rig.flight.motion_stamp * self.rig.frame_rate
         driven, states = _digest(self.moved), self.restarts
 
         def plain() -> Flown | None:
             moves = late if has_gusts(flight) else 0.0
-            asked = (flight, self.compared, driven, moves)
-            return self.flights.of(asked, lambda: self.fly(flight, self.moved, late=moves))
+            asked = (coarse, moves, self.compared, driven, flight)
+            fly = partial(self.fly, flight, self.moved, late=moves, coarse=coarse)
+            return self.flights.of(asked, fly)
 
         def restarted() -> Flown | None:
             assert states is not None
-            return self.flights.of(
-                (flight, SLOW, driven, late),
-                lambda: self.fly(flight, self.moved, late=late, restarts=states.at(late)),
-            )
+            fly = partial(self.fly, flight, self.moved, late=late, coarse=coarse)
+            asked = (coarse, late, SLOW, driven, flight)
+            return self.flights.of(asked, lambda: fly(restarts=states.at(late)))
 
         if states is None or is_throttled(self.record):
             return [plain(), None]
@@ -234,6 +245,7 @@ class Model:
         restarts: States | None = None,
         channels: tuple[str, ...] = (),
         air: GivenAir | None = None,
+        coarse: bool = False,
     ) -> Flown:
         """Return the flight with the given surface motion, interpolated between the rows.
 
@@ -245,9 +257,8 @@ class Model:
         channels = channels or (self.compared if restarts is None else SHOT)
         given = (flight, self.rig.frame_rate, flown_by(self.rig), moved, channels, self.record)
         rows = "held" if self.rig.controls else between
-        return in_turn(
-            partial(fly_open_loop, *given, air=air, between_rows=rows, restarts=restarts)
-        )
+        laws: dict[str, Any] = {"air": air, "between_rows": rows, "restarts": restarts}
+        return in_turn(partial(fly_open_loop, *given, **laws, coarse=coarse))
 
 
 def _in_time(rig: Rig) -> Flight:

@@ -28,7 +28,7 @@ from coupled.flight.aircraft import make_aircraft
 from coupled.flight.airframe import JSBSimAirframe
 from coupled.flight.altered import STILL
 from coupled.flight.everyframe import PROPERTIES
-from coupled.flight.gusts import DRAWN, GivenAir, Gusts
+from coupled.flight.gusts import DRAWN, GivenAir, Gusts, in_pairs
 from coupled.gap.noise.smooth import Smoother, smoothed
 from coupled.gap.signals.conditions import trim_shift, wrappers_of
 from coupled.gap.signals.output import Floats, estimate_noise
@@ -115,6 +115,7 @@ def fly_open_loop(
     air: GivenAir = DRAWN,
     between_rows: Between = "held",
     restarts: States | None = None,
+    coarse: bool = False,
 ) -> Flown:
     """Return the flight of a model from its trim, driven by its surfaces; a row for each frame.
 
@@ -122,42 +123,52 @@ def fly_open_loop(
     conditions of the flight of a `record` act on the model as on the aircraft; recorded surface
     positions include their shift of the trim. `air` is the motion of the air. `between_rows` is how
     the commands change over a frame of several steps: `held`, as those of a host, or interpolated.
-    `restarts` are states of the motion from which the flight goes on, by row. Raises InputError if
+    `restarts` are states of the motion from which the flight goes on, by row. The steps of a
+    `coarse` flight are twice as wide, and rows between them are interpolated. Raises InputError if
     the model cannot be trimmed.
     """
-    still = changed(flight, STILL, "rig", "flight")
-    frame_s, steps = 1.0 / frame_rate_Hz, 1
-    conditions = [] if record is None else wrappers_of(record, frame_s)
+    frame_s, steps, rows = 1.0 / frame_rate_Hz, 1, len(moved[0].values)
     shifts = [0.0 if record is None else trim_shift(record, one, frame_s)[:-1] for one in controls]
-    if between_rows != "held" and flight.steps_per_frame > 1:
-        steps = flight.steps_per_frame
-        still = changed(still, {"steps_per_frame": 1}, "rig", "flight")
+    per_frame, wide = flight.steps_per_frame, 1
+    if coarse and per_frame > 1:
+        per_frame //= 2
+    elif coarse:
+        wide = 2
+        frame_s, air = wide * frame_s, air.in_pairs()
+    conditions = [] if record is None else wrappers_of(record, frame_s)
+    if between_rows != "held" and per_frame > 1:
+        steps, per_frame = per_frame, 1
         frame_s /= steps
         air = air.repeated(steps)
+    still = changed(flight, {**STILL, "steps_per_frame": per_frame}, "rig", "flight")
     gusts = Gusts(still, frame_s, air=air)
     models = [aircraft_folder()]
     airframe = make_aircraft(still, frame_s, controls, models, conditions=conditions, gusts=gusts)
     start = dict(zip(motion_channels(controls, flown=True), airframe.motion(), strict=True))
     trim = tuple(start[one.channel] for one in moved)
-    asked = np.zeros((len(moved[0].values) + 1, 3))
+    asked = np.zeros((rows + 1, 3))
     for i, (one, own) in enumerate(zip(moved, trim, strict=True)):
         asked[:-1, i] = one.commands(own)
         if one.points is not None:
             asked[1:-1, i] -= shifts[i]  # a row results from the frame before it
     asked[-1] = asked[-2]
     if steps == 1:
-        asked = asked[1:]
+        asked = asked[1:] if wide == 1 else in_pairs(asked[1:])
     else:  # at each step after the first row
         law = PchipInterpolator if between_rows == "pchip" else CubicSpline
         at = (1.0 + np.arange((len(asked) - 1) * steps)) / steps
         asked = law(np.arange(len(asked)), asked, axis=0)(at)
-    states = {row * steps: state for row, state in (restarts or {}).items()}
+    states = {row * steps // wide: state for row, state in (restarts or {}).items()}
     led = [
         _Led(i, airframe.reader(PROPERTIES[one.channel]), one.gain)
         for i, one in enumerate(moved)
         if one.gain
     ]
-    return Flown(_motion(airframe, asked, channels, states, led)[::steps], trim)
+    motion = _motion(airframe, asked, channels, states, led)[::steps]
+    if wide > 1:
+        at, known = np.arange(rows), wide * np.arange(len(motion))
+        motion = np.column_stack([np.interp(at, known, one) for one in motion.T])
+    return Flown(motion, trim)
 
 
 @dataclass

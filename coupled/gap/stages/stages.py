@@ -60,6 +60,7 @@ from coupled.gap.thresholds import (
     SIGMAS,
     SMALL,
     TRIES,
+    COARSE_STEPS_Hz,
     PIECE_s,
     STRETCH_s,
 )
@@ -160,7 +161,8 @@ class Reader(Reading):
     ) -> Output:
         rate, missed = self.rig.frame_rate, self.missed.seen
         made = Output(stage, name, measured, predict, floor, rate, self.number, missed=missed)
-        return replace(made, stepped=stage in STEPPED and made.allows_coarse_steps(self.rig))
+        fine = stage in STEPPED and self.rig.loader_rate > COARSE_STEPS_Hz
+        return replace(made, stepped=fine and made.allows_coarse_steps(self.rig))
 
     def _schedule(self) -> list[Output]:
         pressure, gradient = self.record["dynamic_pressure_Pa"], self.signal("gradient")
