@@ -39,6 +39,7 @@ from coupled.gap.signals.output import (
 from coupled.gap.stages.openloop import (
     SLOW,
     Between,
+    Manner,
     Flown,
     Moved,
     Restarts,
@@ -257,8 +258,8 @@ class Model:
         channels = channels or (self.compared if restarts is None else SHOT)
         given = (flight, self.rig.frame_rate, flown_by(self.rig), moved, channels, self.record)
         rows = "held" if self.rig.controls else between
-        laws: dict[str, Any] = {"air": air, "between_rows": rows, "restarts": restarts}
-        return in_turn(partial(fly_open_loop, *given, **laws, coarse=coarse))
+        manner = Manner(air, rows, restarts or {}, coarse)
+        return in_turn(partial(fly_open_loop, *given, manner))
 
 
 def _in_time(rig: Rig) -> Flight:

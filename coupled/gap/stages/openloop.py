@@ -18,7 +18,7 @@ are known. States that are not recorded stay those of the model.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -104,6 +104,23 @@ class Flown:
     trim: tuple[float, ...]  # rad, in the order of the controls
 
 
+@dataclass(frozen=True)
+class Manner:
+    """How a model is flown beside its surfaces.
+
+    air           the motion of the air
+    between_rows  how the commands change over a frame of several steps: `held`, as those of a host,
+                  or interpolated
+    restarts      states of the motion from which the flight goes on, by row
+    coarse        whether steps are twice as wide; rows between them are interpolated
+    """
+
+    air: GivenAir = DRAWN
+    between_rows: Between = "held"
+    restarts: States = field(default_factory=dict)
+    coarse: bool = False
+
+
 def fly_open_loop(
     flight: Flight,
     frame_rate_Hz: float,
@@ -111,32 +128,25 @@ def fly_open_loop(
     moved: Sequence[Moved],
     channels: Sequence[str],
     record: Record | None = None,
-    *,
-    air: GivenAir = DRAWN,
-    between_rows: Between = "held",
-    restarts: States | None = None,
-    coarse: bool = False,
+    manner: Manner | None = None,
 ) -> Flown:
     """Return the flight of a model from its trim, driven by its surfaces; a row for each frame.
 
     A channel may be any property of the model, in JSBSim's unit; it is 0 if the model lacks it. The
     conditions of the flight of a `record` act on the model as on the aircraft; recorded surface
-    positions include their shift of the trim. `air` is the motion of the air. `between_rows` is how
-    the commands change over a frame of several steps: `held`, as those of a host, or interpolated.
-    `restarts` are states of the motion from which the flight goes on, by row. The steps of a
-    `coarse` flight are twice as wide, and rows between them are interpolated. Raises InputError if
-    the model cannot be trimmed.
+    positions include their shift of the trim. Raises InputError if the model cannot be trimmed.
     """
-    frame_s, steps, rows = 1.0 / frame_rate_Hz, 1, len(moved[0].values)
+    manner = Manner() if manner is None else manner
+    frame_s, steps, rows, air = 1.0 / frame_rate_Hz, 1, len(moved[0].values), manner.air
     shifts = [0.0 if record is None else trim_shift(record, one, frame_s)[:-1] for one in controls]
     per_frame, wide = flight.steps_per_frame, 1
-    if coarse and per_frame > 1:
+    if manner.coarse and per_frame > 1:
         per_frame //= 2
-    elif coarse:
+    elif manner.coarse:
         wide = 2
         frame_s, air = wide * frame_s, air.in_pairs()
     conditions = [] if record is None else wrappers_of(record, frame_s)
-    if between_rows != "held" and per_frame > 1:
+    if manner.between_rows != "held" and per_frame > 1:
         steps, per_frame = per_frame, 1
         frame_s /= steps
         air = air.repeated(steps)
@@ -155,10 +165,10 @@ def fly_open_loop(
     if steps == 1:
         asked = asked[1:] if wide == 1 else in_pairs(asked[1:])
     else:  # at each step after the first row
-        law = PchipInterpolator if between_rows == "pchip" else CubicSpline
+        law = PchipInterpolator if manner.between_rows == "pchip" else CubicSpline
         at = (1.0 + np.arange((len(asked) - 1) * steps)) / steps
         asked = law(np.arange(len(asked)), asked, axis=0)(at)
-    states = {row * steps // wide: state for row, state in (restarts or {}).items()}
+    states = {row * steps // wide: state for row, state in manner.restarts.items()}
     led = [
         _Led(i, airframe.reader(PROPERTIES[one.channel]), one.gain)
         for i, one in enumerate(moved)
@@ -166,8 +176,8 @@ def fly_open_loop(
     ]
     motion = _motion(airframe, asked, channels, states, led)[::steps]
     if wide > 1:
-        at, known = np.arange(rows), wide * np.arange(len(motion))
-        motion = np.column_stack([np.interp(at, known, one) for one in motion.T])
+        known = wide * np.arange(len(motion))
+        motion = np.column_stack([np.interp(np.arange(rows), known, one) for one in motion.T])
     return Flown(motion, trim)
 
 
