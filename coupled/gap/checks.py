@@ -238,24 +238,32 @@ def _surface_is_reversed(rig: Rig, record: Record, control: ControlName) -> bool
     return plausible.move_oppositely(np.interp(command, *points), record[name])
 
 
-def spoiled(record: Record, control: ControlName, file: str) -> list[str]:
-    """Return a sentence on each sensor of a control that is clipped or repeats its readings.
+def clipped(record: Record, control: ControlName, file: str) -> list[str]:
+    """Return a sentence on each sensor of a control that is clipped."""
+    ends = {name: plausible.clipped_at(one) for name, one in _signals(record, control).items()}
+    return [
+        f"{name} of {file} is clipped at {end:.4g}; no effect explains what is lost beyond."
+        for name, end in ends.items()
+        if end is not None
+    ]
+
+
+def not_measured(record: Record, control: ControlName | None, file: str) -> list[str]:
+    """Return a sentence on each sensor of a control that repeats its readings.
 
     One more tells that the import has interpolated the log's rows.
     """
-    said = []
-    for name, signal in _signals(record, control).items():
-        if (end := plausible.clipped_at(signal)) is not None:
-            said.append(
-                f"{name} of {file} is clipped at {end:.4g}; no effect explains what is lost beyond."
-            )
-        if repeats := plausible.held(signal):
-            said.append(f"{name} of {file} {repeats}: an effect here may be the recorder's.")
+    signals = {} if control is None else _signals(record, control)
+    said = [
+        f"{name} of {file} {repeats}: an effect may be the recorder's. Log it anew every frame."
+        for name, signal in signals.items()
+        if (repeats := plausible.held(signal))
+    ]
     log_Hz = log_rate_of(record)
     if log_Hz is not None and log_Hz < (1.0 - SMALL) * sampling_rate_of(record, file):
         said.append(
             f"{file} is interpolated between the {log_Hz:.4g} rows a second of its log: its noise "
-            "is unknown, and a small gap may be the interpolation's."
+            "is unknown, and a gap may be the interpolation's. Log every frame."
         )
     return said
 

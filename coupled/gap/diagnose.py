@@ -42,7 +42,7 @@ from coupled.gap.signals.reading import Reading
 from coupled.gap.stages.airframe import needs
 from coupled.gap.stages.surfaces import surface_points
 from coupled.gap.stages.tried import TERMS_OPTION
-from coupled.gap.thresholds import DOUBLED, TINY
+from coupled.gap.thresholds import DOUBLED, MOST, TINY
 from coupled.parallel import in_threads, threads
 from coupled.record.channels import CONTROL_NAMES, ControlName, channel
 from coupled.record.record import Record
@@ -228,6 +228,8 @@ def findings(prepared: Prepared, case: Case, choice: Choice) -> PartDiagnosis:
     judge = Judge(readers, outputs, choice, case.gaps(fit.rig))
     stages = _of_part(part, judge.stages())
     effects = effects_of(case, choice, readers, stages)
+    if prepared.by_recorder:  # as probably as by an effect
+        effects = tuple(replace(one, probability=MOST * one.probability) for one in effects)
     if unsure := incredible(choice, effects):
         stages = _of_part(part, replace(judge, doubted=unsure).stages())
     fitted = Problem(case).fit(fit.effects, fit.values, descent=Descent("own"), part="fitted")
@@ -240,6 +242,8 @@ def findings(prepared: Prepared, case: Case, choice: Choice) -> PartDiagnosis:
         records = list(prepared.records.values())
         change = baseline.compared(records, prepared.case.outputs, part.own)
     verdict = verdict_of(choice, stages, effects, budget)
+    if prepared.by_recorder and effects:
+        verdict = "ambiguous"
     verdict, stages = beside_healthy(verdict, stages, baseline, change)
     curves = None
     if part.own and verdict in ("mostly", "unexplained"):

@@ -35,8 +35,9 @@ from coupled.gap.checks import (
     check_record,
     check_trim,
     check_units,
+    clipped,
     motion_alone,
-    spoiled,
+    not_measured,
     trim_speed,
     trimmed,
 )
@@ -69,7 +70,8 @@ class Prepared:
 
     `case` holds the rig and the outputs, `library` the effects that can be tried. `trim` and
     `left_out` are sentences for the report: the trim that was taken from the records, and what of
-    the records is not judged. `baseline` is the healthy machine, if it is known.
+    the records is not judged. `baseline` is the healthy machine, if it is known. `by_recorder`:
+    rows that no sensor has measured may be the cause of what is found.
     """
 
     part: Part
@@ -80,6 +82,7 @@ class Prepared:
     trim: str = ""
     left_out: tuple[str, ...] = ()
     baseline: Baseline | None = None
+    by_recorder: bool = False
 
 
 def prepare(
@@ -128,9 +131,11 @@ def prepare(
     if not outputs:
         raise InputError(next(iter(records)), "", _too_little(rig, control, judged.readers))
     check_against_model(outputs, rig, list(records), each)
-    left_out = [why for one in live for why in one.left_out]
+    own = control if part.own else None
+    repeated = [words for file, one in records.items() for words in not_measured(one, own, file)]
+    left_out = [*(why for one in live for why in one.left_out), *repeated]
     for file, record in records.items() if part.own else ():
-        left_out += spoiled(record, control, file)
+        left_out += clipped(record, control, file)
     if any(output.stage == AIRFRAME for output in outputs) and (words := not_judged(each)):
         left_out.append(words)
     library = [one for one in library_of(rig, control) if part.frees(keys_of([one]))]
@@ -145,6 +150,7 @@ def prepare(
         trim,
         tuple(dict.fromkeys(left_out)),
         baseline,
+        bool(repeated) and baseline is None,
     )
 
 

@@ -102,7 +102,7 @@ def test_coarse_steps_are_those_of_the_loader_alone_and_only_where_asked_for() -
     coarse = coarsely_stepped(RIG)
     assert coarse.substeps == COARSE_STEPS_Hz / RIG.frame_rate < RIG.substeps
     assert coarse.controls == RIG.controls
-    assert coarsely_stepped(coarse) is coarse
+    assert coarsely_stepped(coarse) == coarse
     seen: list[int] = []
 
     def predicted(rig: Rig) -> Floats:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 
 import coupled
 from coupled.errors import InputError
-from coupled.gap.checks import check_record, spoiled
+from coupled.gap.checks import check_record, clipped, not_measured
 from coupled.gap.diagnose import diagnose
 from coupled.record.channels import ControlName
 from coupled.record.importing.plausible import drives_the_hand, held
@@ -55,10 +56,10 @@ def test_a_reversed_sensor_is_refused_by_name(signs: tuple[int, int, int], name:
 
 def test_a_clipped_sensor_is_named() -> None:
     record = moved(0.2)
-    assert spoiled(record, "column", "r.csv") == []
+    assert clipped(record, "column", "r.csv") == []
     data = record.data.copy()
     data[:, 1] = np.clip(data[:, 1], -10.0, 10.0)
-    [said] = spoiled(Record(NAMES, data), "column", "r.csv")
+    [said] = clipped(Record(NAMES, data), "column", "r.csv")
     assert "column_force_N of r.csv is clipped at 10" in said
 
 
@@ -68,8 +69,23 @@ def test_a_sensor_that_renews_its_value_more_rarely_than_the_rows_is_named(rows:
     record = moved(1.0)
     data = record.data.copy()
     data[:, 3] = data[np.arange(len(data)) // rows * rows, 3]
-    [said] = spoiled(Record(NAMES, data), "column", "r.csv")
+    [said] = not_measured(Record(NAMES, data), "column", "r.csv")
     assert f"column_deflection_m of r.csv holds each value over {rows}" in said
+
+
+def test_an_effect_beside_a_sensor_that_holds_its_value_is_as_probably_the_recorders(
+    tmp_path: Path,
+) -> None:
+    """A servo lag at 0.89 was the answer for a healthy machine."""
+    rig = nominal_rig(False)
+    record = made(tmp_path, rig, {}, 5)
+    data, at = record.data.copy(), record.channels.index("column_deflection_m")
+    data[:, at] = data[np.arange(len(data)) // 6 * 6, at]
+    found = diagnose(rig, {"r": replace(record, data=data)})
+    assert found.verdict == "ambiguous"
+    assert found.effects
+    assert max(one.probability for one in found.effects) < 0.5
+    assert "may be the recorder's" in found.summary
 
 
 @pytest.mark.parametrize("value", [0.0, None])
@@ -77,7 +93,7 @@ def test_a_sensor_that_stands_still_while_the_control_moves_is_named(value: floa
     data = moved(1.0).data.copy()
     data[:, 1] += 0.02 * np.random.default_rng(5).standard_normal(len(data))
     data[510:530, 1] = data[510, 1] if value is None else value
-    [said] = spoiled(Record(NAMES, data), "column", "r.csv")
+    [said] = not_measured(Record(NAMES, data), "column", "r.csv")
     stuck = f"stands still at {data[510, 1]:.4g} over rows 512 to 531"
     assert f"column_force_N of r.csv {stuck}" in said
 
@@ -102,7 +118,7 @@ def test_a_log_of_fewer_rows_than_the_record_is_named() -> None:
     record = moved(1.0)
     for log_rate_Hz, count in ((50.0, 1), (100.0, 0), (None, 0), ("50", 0)):
         manifest = {"import": {"clock": {"log_rate_Hz": log_rate_Hz}}}
-        said = spoiled(replace(record, manifest=manifest), "column", "r.csv")
+        said = not_measured(replace(record, manifest=manifest), "column", "r.csv")
         assert len(said) == count
         assert all("interpolated between the 50 rows a second of its log" in one for one in said)
 

@@ -39,8 +39,8 @@ from coupled.gap.signals.output import (
 from coupled.gap.stages.openloop import (
     SLOW,
     Between,
-    Manner,
     Flown,
+    Manner,
     Moved,
     Restarts,
     States,
