@@ -149,3 +149,17 @@ def test_late_stamps_of_the_motion_delay_its_restarts_too(rig: Rig, healthy: Rec
     found = slow(airframe_outputs(rig, Record(healthy.channels, data)))
     assert found["pitch_rad"].gap(rig) > found["pitch_rad"].limit
     assert all(output.gap(late) < output.limit for output in found.values())
+
+
+@pytest.mark.parametrize("steps", [1, 2])
+def test_an_effect_changes_a_flight_of_wide_steps_nearly_as_one_of_its_own(
+    rig: Rig, healthy: Record, steps: int
+) -> None:
+    mine = rig.changed({"flight.steps_per_frame": steps})
+    other = mine.changed({"flight.pitch_damping": 1.1, "flight.drag": 1.1})
+    moved = {one.channel: one for one in airframe_outputs(mine, healthy)}
+    for name in ("pitch_rate_rad_per_s", "load_factor", *SLOW):
+        exact = moved[name].residual(other) - moved[name].residual(mine)
+        wide = moved[name].change(mine, other)
+        off = np.linalg.norm(wide - exact) / np.linalg.norm(exact)
+        assert 0.0 < off < 0.2, name
