@@ -126,6 +126,13 @@ def test_the_order_of_day_and_month_is_that_of_the_shorter_log(tmp_path: Path) -
     assert (account.clock.frames, account.clock.frame_rate_Hz) == (ROWS, 120.0)
 
 
+def test_the_serial_days_of_a_spreadsheet_are_the_clock(tmp_path: Path) -> None:
+    path = table(tmp_path, np.round(45992.6341203704 + TIME_s / 86400.0, 10), "Date")
+    record, account = imported_as_suggested(path)
+    assert account.clock.log_rate_Hz == pytest.approx(120.0, rel=1e-3)
+    assert len(record) == ROWS
+
+
 def test_dates_in_an_unknown_pattern_are_asked(tmp_path: Path) -> None:
     log = table(tmp_path, [f"25 Okt, 2h59m{50 + t:09.6f}" for t in TIME_s])
     proposal = propose([log])

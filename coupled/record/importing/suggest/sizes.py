@@ -37,7 +37,7 @@ COMMON_Hz = (
     *(10.0, 20.0, 25.0, 30.0, 40.0, 50.0, 60.0, 64.0, 75.0, 80.0, 100.0, 120.0, 125.0, 128.0),
     *(200.0, 240.0, 250.0, 256.0, 400.0, 480.0, 500.0, 1000.0, 2000.0),
 )
-TIMES = ("s", "ms", "us", "ns")
+TIMES = ("s", "ms", "us", "ns", "d")  # days: serial numbers of spreadsheets
 USUAL = 0.5  # largest deviation of a usual step from the median one, relative
 LEAST_others = 10  # different numbers beside a sentinel
 FAR = 5.0  # distance of a sentinel from the other numbers, over their range
