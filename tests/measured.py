@@ -1,7 +1,7 @@
 """How far the gap of each measured machine shrinks by effects alone, and with curves.
 
-    python -m tests.measured ../shared/real        every machine
-    python -m tests.measured ../shared/real emps so101        those whose names begin so
+    python -m tests.measured        every machine in ../shared/real
+    python -m tests.measured FOLDER emps so101        those of a folder whose names begin so
 
 The data are of others and are not shipped. A row is a record: the verdict, its channel with the
 widest gap in noise floors, and the share of this gap that is closed on held-out stretches, with its
@@ -70,4 +70,4 @@ def main(folder: str, begins: tuple[str, ...]) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1], tuple(sys.argv[2:]))
+    main(sys.argv[1] if len(sys.argv) > 1 else "../shared/real", tuple(sys.argv[2:]))
