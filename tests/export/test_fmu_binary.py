@@ -208,6 +208,16 @@ def test_a_step_of_several_frames_is_several_steps(bench: Loaded) -> None:
     assert bench.get(one, "time") == [6 * T]
 
 
+@pytest.mark.parametrize("rounded", [1e-12, -4e-10])
+def test_an_importer_s_rounding_of_the_frame_adds_up(bench: Loaded, rounded: float) -> None:
+    """As of the step that the export prints, or of times that are added up."""
+    one, step, time = bench.instance(column_force_N=5.0), bench.made.frame_s + rounded, 0.0
+    for _ in range(20000):
+        one.doStep(time, step)
+        time += step
+    assert bench.get(one, "time") == [time]
+
+
 def test_the_derivative_of_the_force_by_fmi_2_is_its_rate(bench: Loaded) -> None:
     if bench.made.fmi == 3:
         pytest.skip("FMI 3 has no derivatives of inputs")
@@ -295,6 +305,11 @@ def test_an_unknown_reference_a_wrong_token_and_another_order_are_refused(bench:
     with pytest.raises(FMICallException):
         early.doStep(0.0, bench.made.frame_s)
     assert "before the initialization" in bench.said[-1]
+    ended = bench.instance()
+    ended.terminate()
+    with pytest.raises(FMICallException):
+        ended.doStep(0.0, bench.made.frame_s)
+    assert "the instance is terminated; reset it" in bench.said[-1]
     early.guid = "{other}"
     with pytest.raises(Exception, match="instantiate"):
         bench._instantiate(early)

@@ -38,10 +38,10 @@ EXPORT int fmi2SetupExperiment(Instance *one, int tolerance_defined, double tole
                                double start_s, int stop_defined, double stop_s) {
     (void)tolerance_defined, (void)tolerance, (void)stop_defined, (void)stop_s;
     if (one->state.mode != INSTANTIATED) return fail(one, "the instance is initialized already");
-    one->state.start_s = start_s;
+    one->state.time_s = start_s;
     return OK;
 }
-EXPORT int fmi2EnterInitializationMode(Instance *one) { return start(one, one->state.start_s); }
+EXPORT int fmi2EnterInitializationMode(Instance *one) { return start(one, one->state.time_s); }
 EXPORT int fmi2ExitInitializationMode(Instance *one) { return finish_start(one); }
 EXPORT int fmi2Terminate(Instance *one) { return terminate(one); }
 EXPORT int fmi2Reset(Instance *one) { return reset(one); }

@@ -120,9 +120,7 @@ static Status run_frame(Instance *one, State *state) {
             return fail(one, "at %g s: %s is not finite", state->time_s, VARIABLE[OUTPUT + i].name);
     }
     state->started = 1;
-    state->frame++;
-    state->time_s = state->start_s + state->frame * FRAME_s;
-    v[TIME] = state->time_s;
+    state->time_s += FRAME_s;
     return OK;
 }
 
@@ -135,10 +133,13 @@ static Status compute_first_outputs(Instance *one) {
     return OK;
 }
 
+/* The importer's times count, so that the rounding of its steps adds up in both alike. */
 Status step(Instance *one, double time_s, double step_s) {
     State *state = &one->state;
     if (state->mode == FAILED)
         return fail(one, "the last step failed; reset the instance, or set a saved state");
+    if (state->mode == TERMINATED)
+        return fail(one, "the instance is terminated; reset it, or set a saved state");
     if (state->mode != STEPPING) return fail(one, "a step before the initialization is finished");
     double near_s = NEAR * FRAME_s + 1e-12 * fabs(state->time_s);
     if (!(fabs(time_s - state->time_s) <= near_s))
@@ -149,6 +150,7 @@ Status step(Instance *one, double time_s, double step_s) {
                     step_s, FRAME_s);
     if (apply_parameters(one, state) != OK) return ERROR;
     double force = state->values[FORCE], rate = state->values[FORCE_RATE];
+    state->time_s = time_s;
     for (int64_t i = 0; i < (int64_t)frames; i++) {
         state->values[FORCE] = force + rate * (i * FRAME_s);
         if (run_frame(one, state) != OK) {
@@ -157,6 +159,8 @@ Status step(Instance *one, double time_s, double step_s) {
         }
     }
     state->values[FORCE] = force;
+    if (state->mode != FAILED) state->time_s = time_s + step_s;
+    state->values[TIME] = state->time_s;
     return state->mode == FAILED ? ERROR : OK;
 }
 
@@ -165,7 +169,7 @@ Status step(Instance *one, double time_s, double step_s) {
 Status start(Instance *one, double time_s) {
     if (one->state.mode != INSTANTIATED) return fail(one, "the instance is initialized already");
     if (!isfinite(time_s)) return fail(one, "the start time is not finite");
-    one->state.start_s = one->state.time_s = one->state.values[TIME] = time_s;
+    one->state.time_s = one->state.values[TIME] = time_s;
     one->state.mode = INITIALIZING;
     return OK;
 }

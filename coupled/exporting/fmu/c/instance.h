@@ -22,9 +22,9 @@ typedef enum { INSTANTIATED, INITIALIZING, STEPPING, FAILED, TERMINATED } Mode;
 
 /* All that a step changes: copying it saves the instance. */
 typedef struct {
-    int64_t mode, started, frame;   /* frame: number of frames done */
+    int64_t mode, started;          /* started: a frame is done */
     int64_t parameters_changed;     /* since they were last written into the control */
-    double start_s, time_s;
+    double time_s;                  /* by the importer's clock */
     double values[VARIABLES];       /* by value reference */
     int64_t control[CONTROL_WORDS]; /* parameters and state of all stages */
 } State;
