@@ -79,6 +79,8 @@ class Attached:
         self._seen = 0.0
         self._fresh = False  # the last call of `listen` received a new sample
         self._measures = [False] * len(names)  # whether it contained δ, by control
+        # Of each control, whether a sample before the flight contained δ.
+        self.measures_deflection = [False] * len(names)
         self.time_s = math.nan  # of the last sample, by the loader's clock
         self.lost = False
         self.losses = Losses()
@@ -97,6 +99,7 @@ class Attached:
                 problem = f"does not answer within {ANSWER_s:g} s; start the loader first"
                 raise InputError(self.link.name, "", problem)
         self._take(sample)
+        self._find_transducers()
         self._check_rest()
         controls = self._aboard.controls.copy()
         row = np.zeros((1, len(self._aboard.channels)))
@@ -109,12 +112,25 @@ class Attached:
             placed.frame(0, motion)
             self.order(controls, row[0])
             if self._fade.share >= 1.0:
+                self._warn_of_missing_transducers()
                 return
             self._wait_frame()
             self.listen(0.0)
+            self._find_transducers()
             if time.monotonic() - self._seen > ANSWER_s:
                 problem = "stopped answering while its forces were faded in"
                 raise InputError(self.link.name, "", problem)
+
+    def _find_transducers(self) -> None:
+        """Note which controls have had their δ measured; before the flight only."""
+        pairs = zip(self.measures_deflection, self._measures, strict=True)
+        known = self.link.measures_deflection
+        self.measures_deflection = [known and (before or now) for before, now in pairs]
+
+    def _warn_of_missing_transducers(self) -> None:
+        for name, measured in zip(self._rig.controls, self.measures_deflection, strict=True):
+            if self.link.measures_deflection and not measured:
+                self._warn(f"δ of the {name} is not measured: neither it nor K is recorded")
 
     def _check_rest(self) -> None:
         """Raise InputError if a control is far from its trim before forces are faded in."""
@@ -190,6 +206,8 @@ class Attached:
         """Return the validity of the frame's row (`coupled.record.channels`)."""
         if not self._fresh:
             return LOST if self.lost else REPEATED
+        if any(np.greater(self.measures_deflection, self._measures)):
+            return REPEATED  # δ of the row is that of an earlier sample
         held = self._fade.share < 1.0 or any(limiter.cut for limiter in self._limiters)
         return FADED if held else FRESH
 

@@ -225,8 +225,9 @@ class Host:
         if stopped:
             manifest["ended_early"] = None
         finished = Record(record.channels, record.data, manifest)
-        if self.plan.link is not None:
-            finished = only_measured(finished, self.plan.link, self.switches.rig)
+        if (attached := self.attached) is not None:
+            grips, link = attached.measures_deflection, attached.link
+            finished = only_measured(finished, link, self.switches.rig, grips)
         return self.rows.append_to(finished, first)
 
     def _move_hands(self, positions: HandPositions, k: int) -> None:

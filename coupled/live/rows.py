@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -43,20 +44,22 @@ class Rows:
         return Record(names, data, {**record.manifest, "channels": list(names)})
 
 
-def only_measured(record: Record, link: Link, rig: Rig) -> Record:
-    """Return a record without what its loader did not measure.
+def only_measured(
+    record: Record, link: Link, rig: Rig, measures_deflection: Sequence[bool]
+) -> Record:
+    """Return a record without what its loader did not measure; δ is by control.
 
     F_mod of a hybrid loader is among it: the loader's own multiplier makes it of δc as it is, and
     what the host would make of its reading would pass for a product that is held over the frame.
     """
     lacking: set[str] = set()
-    for name, control in rig.controls.items():
+    for (name, control), grip in zip(rig.controls.items(), measures_deflection, strict=True):
         lacking |= {channel(name, "force_step"), channel(name, "stop"), channel(name, "hand_force")}
         if control.loader.multiplier == "hybrid":
             lacking.add(channel(name, "modifying_force"))
         if not link.measures_force:
             lacking.add(channel(name, "force"))
-        if not link.measures_deflection:
+        if not grip:
             lacking.add(channel(name, "deflection"))
     kept = [i for i, name in enumerate(record.channels) if name not in lacking]
     names = tuple(record.channels[i] for i in kept)

@@ -123,6 +123,14 @@ def test_a_silent_transducer_does_not_change_the_estimate() -> None:
         return now._replace(deflection=math.nan) if time_s > 4.0 else now
 
     record = flown(silent)[0].record
+    assert set(record.between(6.0, 9.0)[VALIDITY]) == {REPEATED}
     assert np.ptp(record.between(6.0, 9.0)["column_deflection_m"]) == 0.0
     found = record.manifest["live"]["bend_in_service"]["column"]
     assert found["bend"] == pytest.approx(COLUMN.loader.bend, rel=0.02)
+
+
+def test_what_was_never_measured_is_not_recorded() -> None:
+    flight, said, _ = flown(lambda _, now: now._replace(deflection=math.nan), 2.0)
+    assert "column_deflection_m" not in flight.record
+    assert set(flight.record[VALIDITY]) == {FRESH}
+    assert said == ["δ of the column is not measured: neither it nor K is recorded"]
