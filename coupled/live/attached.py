@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from coupled.errors import InputError
+from coupled.errors import InputError, listed
 from coupled.flight.companion import FlightAccess
 from coupled.live.link import FADING, OFF, RUN, Link, Measured, Order, Sample, WATCHDOG_s
 from coupled.live.safety import Fade, Limiter, Limits, Plausibility
@@ -96,8 +96,7 @@ class Attached:
         while (sample := self.link.receive(0.02)) is None:
             self.link.send(self._orders, OFF)
             if time.monotonic() - begun > ANSWER_s:
-                problem = f"does not answer within {ANSWER_s:g} s; start the loader first"
-                raise InputError(self.link.name, "", problem)
+                raise InputError(self.link.name, "", self._why_no_answer())
         self._take(sample)
         self._find_transducers()
         self._check_rest()
@@ -120,6 +119,15 @@ class Attached:
             if time.monotonic() - self._seen > ANSWER_s:
                 problem = "stopped answering while its forces were faded in"
                 raise InputError(self.link.name, "", problem)
+
+    def _why_no_answer(self) -> str:
+        if not self.link.dropped:
+            return f"does not answer within {ANSWER_s:g} s; start the loader first"
+        reasons = ", ".join(self.link.dropped)
+        return (
+            f"sends no packet that can be used within {ANSWER_s:g} s ({reasons});"
+            f" give {listed(map(str, self._rig.controls))} in the format of docs/live.md"
+        )
 
     def _find_transducers(self) -> None:
         """Note which controls have had their δ measured; before the flight only."""

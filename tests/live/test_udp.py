@@ -113,6 +113,17 @@ def test_a_restarted_loader_is_accepted_after_the_watchdog_s_time(pair: Pair) ->
     pair.close()
 
 
+def test_a_loader_of_which_no_packet_can_be_used_is_told_why(
+    pair: Pair, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(attached, "ANSWER_s", 0.2)
+    pair.send(pair.good(1, force=math.nan))
+    manoeuvre = Manoeuvre(RIG, {"column": LiveHand()}, 1.0)
+    with pytest.raises(InputError, match=r"no packet that can be used.*\(not a number\)"):
+        fly_live(manoeuvre, Plan(link=pair.link))
+    pair.close()
+
+
 def bad_packets(pair: Pair, count: int) -> list[bytes]:
     """Return packets none of which may be used: noise, damage, replays, numbers out of range."""
     random = np.random.default_rng(3)
