@@ -36,7 +36,7 @@ GRID = 12  # nodes on a side to begin with
 MOVES = (0.5, 0.25, 0.125, 0.0625)  # of the grid's step
 EXACT = 1e-9  # of the largest force: a smaller residual is rounding
 LEAST_READINGS = 8
-READINGS = 400  # of a record: more rows are averaged, so that a fit takes seconds
+READINGS = 400  # of a sweep at one q̄: more rows are averaged, so that a fit takes seconds
 STEADY = 0.05  # of q̄: a larger change is another sweep
 
 
@@ -110,13 +110,33 @@ def read_sweep(path: Path, control: ControlName) -> Sweep:
         raise InputError(path, f"row {number}", problem)
     if given:
         motion = np.array([row.direction for row in rows]) * np.sign(deflection)
-    else:
-        motion = np.zeros(len(rows))
-        for q in np.unique(pressure):
-            motion[pressure == q] = motion_of(deflection[pressure == q])
-    found = Sweep(deflection, force, pressure, motion)
-    _check(path, [row.number for row in rows], found, control)
+        found = Sweep(deflection, force, pressure, motion)
+        _check(path, [row.number for row in rows], found, control)
+        return found
+    sweeps, numbers = [], []
+    for q in np.unique(pressure):
+        at = np.flatnonzero(pressure == q)
+        sweep, firsts = _averaged(deflection[at], force[at], float(q))
+        sweeps.append(sweep)
+        numbers += [rows[at[first]].number for first in firsts]
+    found = Sweep(*map(np.concatenate, zip(*(vars(one).values() for one in sweeps), strict=True)))
+    _check(path, numbers, found, control)
     return found
+
+
+def _averaged(deflection: Floats, force: Floats, pressure: float) -> tuple[Sweep, list[int]]:
+    """Return readings in the order of a sweep at one q̄, and the first row of each.
+
+    A reading is one row, or the mean of several, so that there are at most `READINGS`.
+    """
+    parts = np.array_split(np.arange(len(force)), min(len(force), READINGS))
+    means = np.array([np.mean(deflection[rows]) for rows in parts])
+    # A mean across neutral holds the breakout of both sides, and is not used.
+    one_side = [np.min(deflection[rows]) * np.max(deflection[rows]) > 0.0 for rows in parts]
+    motion = np.where(one_side, motion_of(means), 0.0)
+    forces = np.array([np.mean(force[rows]) for rows in parts])
+    sweep = Sweep(means, forces, np.full(len(parts), pressure), motion)
+    return sweep, [int(rows[0]) for rows in parts]
 
 
 def swept_control(record: Record, file: Path) -> ControlName:
@@ -153,16 +173,9 @@ def sweep_of_record(record: Record, control: ControlName, file: Path) -> Sweep:
     if high - low > STEADY * max(abs(low), abs(high)):
         problem = f"q̄ goes from {low:.4g} to {high:.4g} Pa; give the log of a sweep at one q̄"
         raise InputError(file, q, problem)
-    count = min(len(record), READINGS)
-    parts = np.array_split(np.arange(len(record)), count)
-    deflection = np.array([np.mean(record[name][rows]) for rows in parts])
-    force = np.array([np.mean(record[channel(control, "force")][rows]) for rows in parts])
-    level = np.full(count, float(np.mean(pressure)))
-    # A mean across neutral holds the breakout of both sides, and is not used.
-    one_side = [np.min(record[name][rows]) * np.max(record[name][rows]) > 0.0 for rows in parts]
-    motion = np.where(one_side, motion_of(deflection), 0.0)
-    found = Sweep(deflection, force, level, motion)
-    _check(file, [int(rows[0]) + 2 for rows in parts], found, control)
+    force = record[channel(control, "force")]
+    found, firsts = _averaged(record[name], force, float(np.mean(pressure)))
+    _check(file, [first + 2 for first in firsts], found, control)
     return found
 
 

@@ -40,11 +40,13 @@ def swept(low: float, high: float, readings: int = 160) -> tuple[Floats, Floats]
     return at, np.sign(np.gradient(at))
 
 
-def column_sweep(folder: Path, noise: float = NOISE_N, heads: str = HEADS) -> Path:
+def column_sweep(
+    folder: Path, noise: float = NOISE_N, heads: str = HEADS, readings: int = 160
+) -> Path:
     """Write the sweeps of a 737-like column, read in the order of the sweep."""
     rng, lines = np.random.default_rng(7), [heads]
     for pressure, forces in FORCES.items():
-        at, motion = swept(-NODES[-1], NODES[-1])
+        at, motion = swept(-NODES[-1], NODES[-1], readings)
         felt = np.sign(at) * (BREAKOUT_N + np.interp(np.abs(at), NODES, forces))
         felt += FRICTION_N * motion + noise * rng.standard_normal(len(at))
         lines += [f"{pressure},{d:.5f},{f:.3f}" for d, f in zip(at, felt, strict=True)]
@@ -70,6 +72,14 @@ def test_a_columns_breakout_friction_and_five_segments_are_recovered(tmp_path: P
         ours = BREAKOUT_N + np.interp(there, NODES, forces)
         theirs = found.breakout_N + np.interp(there, found.deflection, row)
         assert theirs == pytest.approx(ours, abs=1.0)
+
+
+def test_the_readings_of_a_fit_are_limited_by_means(tmp_path: Path) -> None:
+    sweep = read_sweep(column_sweep(tmp_path, readings=4000), "column")
+    assert len(sweep.force) == 400 * len(FORCES)
+    found = fit_feel(sweep)
+    assert found.friction_N == pytest.approx(FRICTION_N, abs=2.0 * found.friction_half_width_N)
+    assert found.rms_N == pytest.approx(NOISE_N / np.sqrt(10.0), rel=0.2)
 
 
 def test_exact_readings_give_the_exact_curve(tmp_path: Path) -> None:
