@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,7 +10,7 @@ from rich.markup import escape
 
 from coupled.cli.app import JsonOption, app
 from coupled.cli.progress import progress
-from coupled.cli.terminal import check_json, err, give_json, out, say
+from coupled.cli.terminal import check_json, err, give_json, out, refuse_needless, say
 from coupled.errors import InputError, nearest
 from coupled.resources import find, shipped_rigs
 
@@ -62,13 +61,15 @@ def export(
     file = find(rig, shipped_rigs(), "rig")
     if fmu is not None:
         needless = {"--jsbsim": jsbsim, "--run": run and not case, "--no-check": no_check}
-        _refuse(rig, needless | {"--loader-rate-Hz": rate != RATE_Hz}, "leave it out with --fmu")
+        refuse_needless(
+            rig, needless | {"--loader-rate-Hz": rate != RATE_Hz}, "leave it out with --fmu"
+        )
         exported, _ = (
             _select(read_rig(file), rig, run or [], case) if case else (read_rig(file), [])
         )
         _export_fmu(exported, fmu, control, fmi, file, json_file)
         return
-    _refuse(rig, {"--control": control, "--fmi": fmi != 3}, "is for --fmu only")
+    refuse_needless(rig, {"--control": control, "--fmi": fmi != 3}, "is for --fmu only")
     if jsbsim is None:
         raise InputError(rig, "--jsbsim", "is missing; give it, or --fmu")
     check_folder(jsbsim)
@@ -81,13 +82,6 @@ def export(
     if json_file != "-":
         _say(made, jsbsim, others)
     give_json([one.as_dict() for one in made.beside], json_file)
-
-
-def _refuse(rig: str, given: Mapping[str, object], problem: str) -> None:
-    """Raise InputError for an option that is given and has no effect."""
-    for option, value in given.items():
-        if value:
-            raise InputError(rig, option, problem)
 
 
 def _export_fmu(rig: Rig, fmu: Path, control: str, fmi: int, file: Path, json_file: str) -> None:

@@ -12,7 +12,15 @@ from rich.markup import escape
 
 from coupled.cli.app import JsonOption, app
 from coupled.cli.rigs import say_doubts
-from coupled.cli.terminal import check_json, err, keep_json, out, print_json, say
+from coupled.cli.terminal import (
+    check_json,
+    err,
+    keep_json,
+    out,
+    print_json,
+    refuse_needless,
+    say,
+)
 from coupled.errors import InputError
 from coupled.files import check_target
 from coupled.outputs import Outputs
@@ -25,6 +33,7 @@ if TYPE_CHECKING:
     from coupled.live.recording import Recording
     from coupled.live.session import LiveFlight
 
+_AXES, _HERE = "1,0,3", "127.0.0.1"
 FEW_STALE = 0.01  # share of frames without a new sample that is not mentioned
 _EXAMPLES = (
     "[dim]Examples: coupled live --rig report-column --dashboard · coupled live tracking"
@@ -55,7 +64,7 @@ def live(
         typer.Option(
             metavar="N,N,N", help="The stick's axes: column, wheel, pedals; a minus reverses one."
         ),
-    ] = "1,0,3",
+    ] = _AXES,
     unmeasured: Annotated[
         bool, typer.Option("--unmeasured", help="The loader at udp:// does not measure δ.")
     ] = False,
@@ -75,7 +84,7 @@ def live(
             metavar="ADDRESS",
             help="Address that serves the page; the default admits this machine only.",
         ),
-    ] = "127.0.0.1",
+    ] = _HERE,
     port: Annotated[int, typer.Option(min=0, max=65535, help="Its port; 0: a free one.")] = 0,
     flightgear: Annotated[
         str, typer.Option(metavar="HOST:PORT", help="Send the view to FlightGear.")
@@ -104,7 +113,7 @@ def live(
     from coupled.live.host import Plan
     from coupled.live.keys import Keys
     from coupled.live.recording import Recording
-    from coupled.live.safety import Limits
+    from coupled.live.safety import STRONGEST_N, FASTEST_N_per_s, Limits
     from coupled.live.session import fly_live
     from coupled.record.record import write_record
 
@@ -115,6 +124,20 @@ def live(
         raise InputError(rig, "--hand", "is missing: give page, with --dashboard, or stick")
     if who == "page" and not dashboard:
         raise InputError("--hand", "page", "needs --dashboard")
+    simulated = loader == "sim"
+    needless: dict[str, dict[str, object]] = {
+        "is for a run": {"--case": rig and case},
+        "is for --hand stick": {"--axes": who != "stick" and axes != _AXES},
+        "is for --loader udp://": {"--unmeasured": unmeasured and not loader.startswith("udp:")},
+        "is for a real loader, by --loader": {
+            "--force-limit": simulated and force_limit != STRONGEST_N,
+            "--rate-limit": simulated and rate_limit != FASTEST_N_per_s,
+        },
+        "is for the simulated loader": {"--hand": hand and not simulated},
+        "needs --dashboard": {"--bind": bind != _HERE, "--port": port} if not dashboard else {},
+    }
+    for problem, given in needless.items():
+        refuse_needless("coupled live", given, problem)
     flown = run_live(run, case, duration, who) if run else rig_live(rig, duration)
     path = output or Path("out") / f"{flown.name}.csv"
     _check_targets(flown, path, json_file)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -81,6 +81,13 @@ def say_note(text: str) -> None:
 def say_error(text: str) -> None:
     """Print an error in one line."""
     err.print(f"[red]error:[/] {escape(text)}", soft_wrap=True, highlight=False)
+
+
+def refuse_needless(command: str, given: Mapping[str, object], problem: str) -> None:
+    """Raise InputError for an option that is given and has no effect."""
+    for option, value in given.items():
+        if value:
+            raise InputError(command, option, problem)
 
 
 def check_json(target: str, others: list[Path]) -> None:

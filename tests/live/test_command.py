@@ -48,6 +48,15 @@ def test_a_paced_flight_takes_its_duration(tmp_path: Path) -> None:
         (["capture", "--force-limit", "0"], "--force-limit"),
         (["capture", "--flightgear", "nowhere"], "nowhere"),
         (["capture", "-o", "x.txt"], "a record ends in"),
+        (["capture", "--axes", "a"], "--axes: is for --hand stick"),
+        (["capture", "--port", "8080"], "--port: needs --dashboard"),
+        (["capture", "--unmeasured"], "--unmeasured: is for --loader udp://"),
+        (["capture", "--rate-limit", "500"], "--rate-limit: is for a real loader"),
+        (["--rig", "t37", "--dashboard", "--case", "x"], "--case: is for a run"),
+        (
+            ["--rig", "t37", "--loader", "udp://h:1", "--hand", "stick"],
+            "--hand: is for the simulated loader",
+        ),
     ],
 )
 def test_a_wrong_option_is_refused_in_one_line(words: list[str], said: str, tmp_path: Path) -> None:
