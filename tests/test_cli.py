@@ -34,6 +34,7 @@ def folder(tmp_path: Path) -> Path:
         (["compare", "short.toml", "--no-figure"], 0),
         (["check", "short.toml"], 2),
         (["fly", "short.toml", "-o", "a.xls"], 2),
+        (["compare", "short.toml", "--no-figure", "--panels", "surface"], 2),
         (["nonsense"], 2),
     ],
     ids=lambda given: given[0] if isinstance(given, list) else str(given),

@@ -22,13 +22,24 @@ from coupled.cli.rigs import (
     rig_and_control,
     say_doubts,
 )
-from coupled.cli.terminal import check_json, give_json, keep_json, out, print_json, say, say_note
+from coupled.cli.terminal import (
+    check_json,
+    give_json,
+    keep_json,
+    out,
+    print_json,
+    refuse_needless,
+    say,
+    say_note,
+)
 from coupled.errors import InputError
 from coupled.files import check_target
 from coupled.outputs import Outputs
 
 if TYPE_CHECKING:
     from coupled.calibration.bench import CalibrationBench
+
+_GRID = 5  # gradient sets, and readings in each
 
 
 @app.command(
@@ -38,8 +49,8 @@ if TYPE_CHECKING:
 def bench(
     rig: RigOption = DEFAULT_RIG,
     control: ControlOption = "column",
-    gradients: Annotated[int, typer.Option(help="Gradient sets.", min=1, max=30)] = 5,
-    deflections: Annotated[int, typer.Option(help="Readings in each.", min=1, max=60)] = 5,
+    gradients: Annotated[int, typer.Option(help="Gradient sets.", min=1, max=30)] = _GRID,
+    deflections: Annotated[int, typer.Option(help="Readings in each.", min=1, max=60)] = _GRID,
     nulls: Annotated[int, typer.Option(help="Nulls for S2.", min=0, max=50)] = 6,
     once: OnceOption = False,
     crossed: CrossedOption = 0.0,
@@ -73,6 +84,14 @@ def bench(
     from coupled.calibration.plan import fewest, stations
     from coupled.calibration.readingsfile import write_readings
 
+    if repeat:
+        written = {"--output": output, "--inches": inches}
+        refuse_needless("coupled bench", written, "leave it out with --repeat")
+    if precision is not None:
+        given = {"--gradients": gradients != _GRID, "--deflections": deflections != _GRID}
+        refuse_needless("coupled bench", given, "leave it out with --precision")
+    if perfect:
+        refuse_needless("coupled bench", {"--error": error}, "leave it out with --perfect")
     file, data, name = rig_and_control(rig, control)
     path = output or Path("out") / f"{data.name}-readings.csv"
     if path.suffix.lower() != ".csv":

@@ -21,7 +21,15 @@ from coupled.cli.rigs import (
     rig_and_control,
     say_guesses,
 )
-from coupled.cli.terminal import check_json, keep_json, out, print_json, say, say_note
+from coupled.cli.terminal import (
+    check_json,
+    keep_json,
+    out,
+    print_json,
+    refuse_needless,
+    say,
+    say_note,
+)
 from coupled.display import System, in_system
 from coupled.errors import InputError, shown
 from coupled.files import check_target, write_text
@@ -34,6 +42,8 @@ if TYPE_CHECKING:
     from coupled.calibration.planned import ReadingsPlan
     from coupled.calibration.result import CalibrationResult
     from coupled.rig.rig import Rig
+
+_PRECISION, _STRONGEST_N = 5.0, 150.0
 
 
 @app.command(
@@ -66,8 +76,8 @@ def calibrate(
     plan: Annotated[bool, typer.Option("--plan", help="Choose readings to take.")] = False,
     precision: Annotated[
         float, typer.Option(help="How well a plan is to find K, ± % (95 %).", min=0.1, max=100)
-    ] = 5.0,
-    strongest: StrongestOption = 150.0,
+    ] = _PRECISION,
+    strongest: StrongestOption = _STRONGEST_N,
     once: OnceOption = False,
     crossed: CrossedOption = 0.0,
     figure: Annotated[
@@ -84,14 +94,19 @@ def calibrate(
     if plan:
         if readings is not None or figure is not None:
             raise InputError("--plan", "", "plans readings to come; give no readings and no figure")
-        if report is not None:
-            raise InputError("--plan", "--report", "is for a calibration, not for a plan")
+        of_calibration = {"--report": report, "--hardware": hardware, "--date": date}
+        refuse_needless("--plan", of_calibration, "is for a calibration, not for a plan")
         wanted = (precision / 100.0, strongest, 1 if once else 2, crossed)
         _plan((file, data, name), tools, wanted, (write, json_file), units)
         _say_default(rig)
         return
     if readings is None:
         raise InputError("calibrate", "", "give a file of readings, or --plan for which to take")
+    of_plan = {"--precision": precision != _PRECISION, "--strongest-N": strongest != _STRONGEST_N}
+    of_plan |= {"--once": once, "--crossed-N": crossed > 0.0}
+    refuse_needless(str(readings), of_plan, "is for --plan")
+    if write is None:
+        refuse_needless(str(readings), {"--hardware": hardware}, "is for --write NEW.toml")
     inputs = [readings, file]
     for target, suffix in ((write, ".toml"), (figure, "")):
         if target is not None:

@@ -24,7 +24,16 @@ from coupled.cli.process import INTERRUPTED
 from coupled.cli.progress import progress
 from coupled.cli.reporting import ReportOption, check_report, say_report, write_report
 from coupled.cli.rigs import say_doubts, say_stale
-from coupled.cli.terminal import check_json, err, give_json, keep_json, out, print_json, say
+from coupled.cli.terminal import (
+    check_json,
+    err,
+    give_json,
+    keep_json,
+    out,
+    print_json,
+    refuse_needless,
+    say,
+)
 from coupled.errors import InputError, nearest, shown
 from coupled.files import check_target
 from coupled.outputs import Outputs
@@ -61,6 +70,9 @@ def compare(
     from coupled.flight.manifest import input_files
     from coupled.flight.runfile import read_run
 
+    if no_figure:
+        drawn = {"--figure": figure, "--panels": panels, "--overlay": overlay, "--size": size}
+        refuse_needless(run, drawn, "leave it out with --no-figure")
     cases = read_run(run)
     if case:
         cases = [_labelled(case, cases, run)]
