@@ -85,8 +85,8 @@ class LoaderEnv(gymnasium.Env[Floats, Floats]):
             if not 0.0 < value <= most:
                 problem = f"is {value!r:.40}; give more than 0, at most {most:g}"
                 raise InputError(_ENV, key, problem)
-        if not math.isfinite(change_rad):
-            raise InputError(_ENV, "change_rad", f"is {change_rad}; give a number")
+        if not abs(change_rad) <= math.pi:
+            raise InputError(_ENV, "change_rad", f"is {change_rad}; give an angle from -π to π")
         given = dict(terms or {})
         if "configuration" in given:
             raise InputError(_ENV, "terms.configuration", "is an option itself; give it there")
@@ -128,7 +128,7 @@ class LoaderEnv(gymnasium.Env[Floats, Floats]):
 
         Without a seed the next one is drawn from the environment's generator.
         """
-        super().reset(seed=seed)
+        super().reset(seed=None if seed is None else int(seed))  # gymnasium takes no numpy.int64
         own = int(self.np_random.integers(2**31)) if seed is None else seed
         state = self._session.reset(own)
         self._started_rad = state.as_dict().get(self._angle, 0.0)

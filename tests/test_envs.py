@@ -48,6 +48,8 @@ def test_a_seed_repeats_an_episode() -> None:
     )
     assert np.array_equal(first, again) and np.array_equal(first, there)
     assert not np.array_equal(first, unseeded)
+    drawn: Any = np.int64(3)
+    assert np.array_equal(episode(one, drawn), first)
     episode(other, 3)
     assert np.array_equal(episode(other, None), unseeded)
 
@@ -103,7 +105,8 @@ def test_gymnasium_truncates_an_episode() -> None:
         ({"frames": 10**9}, "frames: is 1000000000; give more than 0, at most 10000"),
         ({"frames": 10**400}, "frames: is 10000.*; give more than 0, at most 10000"),
         ({"force_limit_N": 6000.0}, "force_limit_N: is 6000.0; give more than 0, at most 5000"),
-        ({"change_rad": np.nan}, "change_rad: is nan; give a number"),
+        ({"change_rad": np.nan}, "change_rad: is nan; give an angle from -π to π"),
+        ({"change_rad": 1e200}, r"change_rad: is 1e\+200; give an angle"),
         ({"observed": []}, "observed: needs at least one channel"),
         ({"terms": {"configuration": "rigid"}}, "terms.configuration: is an option itself"),
         ({"terms": {"column": lambda state: 1.0}}, "controls: needs at least one without a pilot"),
