@@ -10,6 +10,7 @@ from coupled.errors import InputError
 from coupled.exporting.befalling import unknown_condition
 from coupled.exporting.model import Files
 from coupled.exporting.write import Export, Flown
+from coupled.files import check_target
 from coupled.flight.altered import ALTERATIONS
 from coupled.flight.manoeuvre import Manoeuvre
 from coupled.outputs import Outputs
@@ -21,11 +22,12 @@ MARK = "coupled-export.json"  # identifies a folder of an export, which may be o
 
 
 def check_folder(folder: Path) -> None:
-    """Raise InputError for a folder with files other than those of a former export."""
+    """Raise InputError for a folder that cannot be written, or has files of no export."""
     if folder.is_file():
         raise InputError(folder, "", "is a file; name a folder")
     if folder.is_dir() and any(folder.iterdir()) and not (folder / MARK).is_file():
         raise InputError(folder, "", "holds files that are no export; name a new folder")
+    check_target(folder / MARK, made=folder)
 
 
 def write_export(made: Export, folder: Path) -> None:

@@ -80,6 +80,23 @@ def test_a_folder_of_other_files_is_left_alone(tmp_path: Path) -> None:
     assert files(tmp_path) == {"mine.txt"}
 
 
+@pytest.mark.parametrize(
+    ("place", "said"),
+    [
+        ("mine.txt/out", "mine.txt/out/coupled-export.json: cannot be written there"),
+        ("no/out", "there is no folder no; make it first"),
+    ],
+)
+def test_a_folder_that_cannot_be_made_is_refused_before_a_flight(
+    tmp_path: Path, place: str, said: str
+) -> None:
+    (tmp_path / "mine.txt").write_text("mine")
+    done = coupled(tmp_path, "export", "bench", "--jsbsim", place, "--no-check")
+    assert done.returncode == 2
+    assert said in done.stderr
+    assert files(tmp_path) == {"mine.txt"}
+
+
 def test_a_key_that_is_not_exported_is_named_with_its_file(tmp_path: Path) -> None:
     text = shipped_rigs()["bench"].read_text(encoding="utf-8")
     (tmp_path / "rig.toml").write_text(text + "\n[controls.column.sensing]\ngauge_mass_kg = 0.2\n")
