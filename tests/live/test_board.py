@@ -58,6 +58,7 @@ def test_a_state_is_read_once_and_complete() -> None:
         '{"what": "set", "value": NaN}',
         '{"what": "set", "value": 1e999}',
         '{"what": "mark", "text": 3}',
+        json.dumps({"what": "hand", "value": 10**400}),
         json.dumps({"what": "mark", "text": "x" * 201}),
     ],
 )

@@ -13,7 +13,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
-import math
 import os
 import secrets
 import signal
@@ -37,6 +36,7 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from coupled.live.dashboard.board import Board
 from coupled.record.channels import CONTROL_NAMES
+from coupled.schema import LARGEST
 
 STATIC = Path(__file__).parent / "static"
 FILES = {
@@ -95,7 +95,7 @@ def request_of(text: str) -> dict[str, Any] | None:
             return None
         plain[key] = value
     value = found.get("value", 0.0)
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) <= LARGEST:
         return None
     return plain | {"value": float(value)}
 
