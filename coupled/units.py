@@ -74,7 +74,7 @@ _NAMED: Final[dict[str, Unit]] = {
         _FORCE: {
             **{"N": 1.0, "daN": 10.0, "kN": 1e3},
             **{"lbf": POUND_N, "lb": POUND_N, "ozf": POUND_N / 16.0},
-            **{"kgf": GRAVITY_m_per_s2, "kp": GRAVITY_m_per_s2},
+            **{"kgf": GRAVITY_m_per_s2, "kp": GRAVITY_m_per_s2, "mN": 1e-3},
         },
         _TORQUE: {
             **{"Nm": 1.0, "mNm": 1e-3, "Ncm": 0.01, "kNm": 1e3, "kgfcm": 0.01 * GRAVITY_m_per_s2},
@@ -86,7 +86,7 @@ _NAMED: Final[dict[str, Unit]] = {
         },
         _LENGTH: {
             **{"m": 1.0, "mm": 1e-3, "cm": 0.01, "km": 1e3},
-            **{"in": INCH_m, "ft": FOOT_m},
+            **{"in": INCH_m, "ft": FOOT_m, "um": 1e-6},
         },
         _TIME: {
             **{"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9},

@@ -54,6 +54,12 @@ def proposed(path: Path, rig: str = "") -> tuple[Proposal, dict[str, Any]]:
         ("cpuload.load", "", ""),
         ("Mode", "", ""),
         ("hand grip", "column_deflection_m", ""),
+        ("Force_kN", "column_force_N", "kN"),
+        ("coil_force_mN", "column_force_N", "mN"),
+        ("load daN", "column_force_N", "daN"),
+        ("Force_uN", "column_force_N", ""),
+        ("qbar_kPa", "dynamic_pressure_Pa", "kPa"),
+        ("grip_um", "column_deflection_m", "um"),
     ],
 )
 def test_a_channel_and_its_unit_are_recognised_by_name(name: str, channel: str, unit: str) -> None:

@@ -64,7 +64,7 @@ COMPUTER = _set(
 SUFFIXES = {
     **{
         word: word
-        for word in sorted(_set("lbf kgf N m mm cm in ft rad mrad deg Pa kPa hPa psf psi"))
+        for word in sorted(_set("lbf kgf N m um mm cm in ft rad mrad deg Pa kPa hPa psf psi"))
     },
     **{word: word for word in sorted(_set("mbar kt mph s ms us ns g"))},
     **{"lb": "lbf", "lbs": "lbf", "dan": "daN", "kts": "kt", "knots": "kt", "inch": "in"},
@@ -75,6 +75,8 @@ SUFFIXES = {
     **{"dps": "deg/s", "km h": "km/h"},
 }
 _LOWER = {key.lower(): unit for key, unit in SUFFIXES.items()}
+# A symbol with a prefix, as in `F_kN`, whose capital begins no word of its own.
+_PREFIXED = re.compile(r"(?<![A-Za-z])([a-z]{1,2}(?:N|Pa|Nm))\W*$")
 
 
 @dataclass(frozen=True)
@@ -124,6 +126,10 @@ def _unit(name: str) -> tuple[str, str]:
     bracket = re.search(r"[\[({<]\s*([^\])}>]+?)\s*[\])}>]\s*$", name)
     if bracket and parse_unit(bracket.group(1)) is not None:
         return name[: bracket.start()], bracket.group(1)
+    prefixed = _PREFIXED.search(name)
+    if prefixed:
+        known = parse_unit(prefixed[1]) is not None
+        return name[: prefixed.start()], prefixed[1] if known else ""
     words = words_of(name)
     for count in (3, 2, 1):
         last = " ".join(words[-count:])
