@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.interpolate import PchipInterpolator
 
 import coupled
 from coupled.errors import InputError
@@ -112,6 +113,16 @@ def test_a_reading_that_repeats_for_another_reason_is_not_named() -> None:
         np.full(100, 3.0),
     ):
         assert held(signal) == ""
+
+
+def test_an_encoder_at_rest_in_an_interpolated_log_is_not_named() -> None:
+    """Play behind a servo stands still at each reversal: the recorder was as probable a cause."""
+    rng = np.random.default_rng(6)
+    log_s = TIME_s + rng.uniform(-1e-3, 1e-3, TIME_s.size)
+    way, count, at = 0.7 * np.sin(2.6 * np.pi * log_s), 1.5e-3, 0.0
+    follows = [at := min(max(at, x - 0.015), x + 0.015) for x in way.tolist()]
+    read = PchipInterpolator(log_s, count * np.rint(np.array(follows) / count))(TIME_s[1:-1])
+    assert held(read) == ""
 
 
 def test_a_log_of_fewer_rows_than_the_record_is_named() -> None:

@@ -36,6 +36,7 @@ END_OVER_STEP = 20.0  # least jump of a spike in the first or last row, over the
 LEAST_POWER = 0.05  # correlation of force and rate from which power has a sign
 # Of noise ten times its resolution, 1 of 35 rows repeats by chance, and four in a row in 1 of 10⁶.
 RESOLVED, LONGEST_REPEAT = 10.0, 4
+ON_GRID = 0.02  # of a step: deviation of levels of a quantised sensor from whole steps
 REGULAR = 0.8  # share of steps that a sensor of a slower rate has at its own period, one row off
 JUMP = 10.0  # standard deviations of noise; two rows of noise differ by half of it in 1 of 2500
 SMALL_STEP = 0.2  # of the range: largest other step of a position from row to row
@@ -118,7 +119,9 @@ def held(values: Floats) -> str:
     change, levels = np.diff(values), np.unique(values)
     if levels.size < 3:
         return ""
-    coarse, moved = RESOLVED * float(np.diff(levels).min()), np.flatnonzero(change)
+    # Rows interpolated between counts lie on all levels, but an encoder at rest repeats a count.
+    step = _step_of_grid(np.unique(values[1:][change == 0.0])) or float(np.diff(levels).min())
+    coarse, moved = RESOLVED * step, np.flatnonzero(change)
     spacing = np.diff(moved)
     every = float(np.median(spacing))
     regular = float(np.mean(np.abs(spacing - every) <= 1.0)) > REGULAR
@@ -151,19 +154,26 @@ def _longest(true: NDArray[np.bool_]) -> int:
     return int(_runs(true)[1].max(initial=0))
 
 
+def _step_of_grid(levels: Floats) -> float | None:
+    """Return the least step of sorted levels, if all steps are whole multiples of it, or None."""
+    steps = np.diff(levels)
+    if steps.size < 2:
+        return None
+    counts = steps / steps.min()
+    return float(steps.min()) if np.all(np.abs(counts - np.rint(counts)) < ON_GRID) else None
+
+
 def quantised_step(values: Floats) -> float | None:
     """Return the step of a channel whose quantisation hides its noise."""
     levels = np.unique(values)
     if levels.size < 3:
         return None
-    steps = np.diff(levels)
-    whole = steps[steps > 1e-6 * np.ptp(values)]
-    step = float(whole.min())
-    counts = whole / step
-    regular = whole.size == steps.size and np.all(np.abs(counts - np.rint(counts)) < 0.02)
+    step = _step_of_grid(levels)
+    if step is None:
+        return None
     coarse = step > 1.5 * noise_level(values) and step > 1e-3 * np.ptp(values)
     # Few rows always lie on some levels, so each level must occur more than once on average.
-    return step if regular and coarse and 2 * levels.size < values.size else None
+    return step if coarse and 2 * levels.size < values.size else None
 
 
 def spikes(values: Floats) -> list[int]:
