@@ -9,8 +9,10 @@ import pytest
 
 from coupled.gap.diagnose import diagnose
 from coupled.gap.effects.library import EFFECTS
+from coupled.gap.findings.proposal import next_tests, pushes
 from coupled.gap.nominal import default_keys, fit_nominal
 from coupled.gap.prepare import as_driven, readers_of
+from coupled.gap.search.found import Candidate, Choice, Fit, Found
 from coupled.gap.stages.tried import as_judged
 from tests.support.machines import damper, damper_rig
 
@@ -28,6 +30,25 @@ def test_a_grip_with_its_force_and_nothing_else_is_taken_as_moved() -> None:
     assert as_driven(rig, both[:1], "column") == damper_rig()
     assert as_driven(rig, both[1:], "column") == rig  # a δc may be a loader's answer
     assert as_driven(rig, both, "column") == rig
+
+
+def test_no_force_is_proposed_to_a_bench_that_imposes_the_motion() -> None:
+    """A robot's joint was to be moved by "slow triangles of ±129 N at 0 kPa"."""
+    named = {effect.name: effect for effect in EFFECTS}
+    effect, rival = named["viscous_damping"], named["coulomb_friction"]
+    fits = [
+        Fit((one,), {value: size}, {}, {}, (), damper_rig(drive="force"), 0.0)
+        for one, value, size in (
+            (effect, "viscous_damping.factor", 0.8),
+            (rival, "coulomb_friction.friction_N", 20.0),
+        )
+    ]
+    step = Found(effect, 9.0, 0.5, (Candidate(9.0, rival, fits[1]),))
+    choice, record = Choice((step,), fits[0], fits[0], {}, ()), damper(seconds=6.0)
+    assert next_tests(damper_rig(), record, "column", choice) == ()
+    [first, *_] = pushes(damper_rig(drive="force"), record, "column")
+    assert first.text.startswith("slow triangles of ±")
+    assert first.text.endswith("N for 15 s")  # the spring is the same at any q̄
 
 
 def test_of_the_linkage_play_and_contact_alone_show_in_the_force_of_a_moved_loader() -> None:

@@ -30,6 +30,7 @@ from coupled.gap.search.evidence import likelier_by
 from coupled.gap.search.found import Choice
 from coupled.gap.search.problem import Problem
 from coupled.gap.signals.output import Floats, Output, white
+from coupled.gap.signals.reading import is_constant
 from coupled.gap.stages.airframe import airframe_outputs
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points
@@ -189,9 +190,14 @@ class Push:
 def next_tests(
     nominal: Rig, record: Record, control: ControlName, choice: Choice
 ) -> tuple[ProposedTest, ...]:
-    """Return the tests that would discriminate the first alternatives found, the best first."""
+    """Return the tests that would discriminate the first alternatives found, the best first.
+
+    They are forces, which a bench that imposes the motion cannot apply.
+    """
     step = next((step for step in choice.steps if step.rivals), None)
     if step is None or channel(control, "force") not in record:
+        return ()
+    if nominal.controls[control].drive != "force":
         return ()
     rival = step.rivals[0]
     others = tuple(effect for effect in choice.fit.effects if effect is not step.effect)
@@ -264,7 +270,7 @@ def pushes(nominal: Rig, record: Record, control: ControlName) -> Iterator[Push]
         for where, pressure, rig in settings:
             on = f" on the {control}" if len(nominal.controls) > 1 else ""
             text_of = f"{text} of ±{written} N{on} for {FLIGHT_s:g} s {where}"
-            yield Push(text_of, most * shape, pressure, rig, control)
+            yield Push(text_of.rstrip(), most * shape, pressure, rig, control)
 
 
 def _shapes(time: Floats) -> list[tuple[str, Floats]]:
@@ -286,14 +292,18 @@ def _shapes(time: Floats) -> list[tuple[str, Floats]]:
 def _pressures(
     nominal: Rig, record: Record, control: ControlName, frames: int
 ) -> list[tuple[str, Floats, Rig]]:
-    """Return a test's possible q̄: as recorded, and over the bench's table or at a higher speed."""
+    """Return a test's possible q̄: as recorded, and over the bench's table or at a higher speed.
+
+    A bench whose gradient is the same at any q̄ has one, without words.
+    """
     name = "dynamic_pressure_Pa"
     usual = float(np.median(record[name])) if name in record else 0.0
     level = np.full(frames, usual)
     here = [(f"at {usual / 1000.0:.2g} kPa", level, nominal)]
-    table = nominal.controls[control].schedule.dynamic_pressure
-    if nominal.flight is None and len(table) == 1:
-        return here
+    schedule = nominal.controls[control].schedule
+    table = schedule.dynamic_pressure
+    if nominal.flight is None and is_constant(schedule):
+        return [("", level, nominal)]
     if nominal.flight is None:
         whole = np.linspace(table[0], table[-1], frames)
         text = f"while q̄ goes from {table[0] / 1000.0:.2g} to {table[-1] / 1000.0:.2g} kPa"
