@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Callable, Sequence
-from itertools import pairwise
 from typing import Protocol
 
 from coupled.flight.everyframe import PlainFrames, PlainSteps
@@ -40,7 +40,7 @@ class Bench:
 
     def __init__(self, frame_s: float, pressures_Pa: Sequence[tuple[float, float]]) -> None:
         self._frame_s = frame_s
-        self._points = list(pressures_Pa)
+        self._times_s, self._pressures_Pa = zip(*pressures_Pa, strict=True)
         self._k = 0
         self.safe_altitude_m = 0.0
         self.motion = self._now
@@ -48,14 +48,12 @@ class Bench:
         self.step = self._next
 
     def _now(self) -> tuple[float, ...]:
-        time = self._k * self._frame_s
-        points = self._points
-        if time <= points[0][0]:
-            return (points[0][1],)
-        for (t0, q0), (t1, q1) in pairwise(points):
-            if time < t1:
-                return (q0 + (q1 - q0) * (time - t0) / (t1 - t0),)
-        return (points[-1][1],)
+        time, times, pressures = self._k * self._frame_s, self._times_s, self._pressures_Pa
+        k = bisect_right(times, time)
+        if k in (0, len(times)):
+            return (pressures[min(k, len(times) - 1)],)
+        t0, q0 = times[k - 1], pressures[k - 1]
+        return (q0 + (pressures[k] - q0) * (time - t0) / (times[k] - t0),)
 
     def _whole(self) -> tuple[float, ...]:
         return self._now() + _AT_REST

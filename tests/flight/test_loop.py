@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import time
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from coupled.flight.bench import Bench
 from coupled.flight.companion import FlightAccess
 from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import Manoeuvre
@@ -185,3 +187,22 @@ def test_the_noise_of_a_channel_is_its_column_of_the_seeds_draws() -> None:
         noise = level * draws[:, drawn.index(name)]
         np.testing.assert_allclose(record[name] - plain[name], noise, rtol=0.0, atol=1e-12)
     np.testing.assert_array_equal(record["column_hand_force_N"], plain["column_hand_force_N"])
+
+
+def test_a_bench_reads_its_pressure_as_fast_however_many_points_it_has() -> None:
+    """At 10 kHz, a test that a diagnosis proposes took minutes to simulate."""
+    times = np.arange(100_000) * 1e-3
+    bench = Bench(0.05, list(zip(times.tolist(), (50.0 * times).tolist(), strict=True)))
+    began = time.process_time()
+    read = []
+    for _ in range(2_000):
+        read.append(bench.motion()[0])
+        bench.step((0.0, 0.0, 0.0))
+    assert time.process_time() - began < 1.0
+    assert read == pytest.approx(np.interp(0.05 * np.arange(2_000), times, 50.0 * times).tolist())
+    ends = Bench(1.0, [(1.0, 10.0), (2.0, 20.0)])
+    held = []
+    for _ in range(4):
+        held.append(ends.motion()[0])
+        ends.step((0.0, 0.0, 0.0))
+    assert held == [10.0, 10.0, 20.0, 20.0]
