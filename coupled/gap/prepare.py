@@ -49,6 +49,7 @@ from coupled.gap.signals.live import judged_part, live_of
 from coupled.gap.signals.output import Floats, Output, estimate_noise, rounding
 from coupled.gap.signals.reading import drifts, softest_gradient, worth_recording
 from coupled.gap.stages.airframe import Flights, airframe_outputs
+from coupled.gap.stages.labels import check_labels
 from coupled.gap.stages.openloop import not_judged
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points
@@ -131,6 +132,7 @@ def prepare(
     if not outputs:
         raise InputError(next(iter(records)), "", _too_little(rig, control, judged.readers))
     check_against_model(outputs, rig, list(records), each)
+    check_labels(outputs, rig, records)
     own = control if part.own else None
     repeated = [words for file, one in records.items() for words in not_measured(one, own, file)]
     left_out = [*(why for one in live for why in one.left_out), *repeated]

@@ -107,6 +107,24 @@ def test_the_lateral_motion_is_compared_if_aileron_and_rudder_are_recorded(healt
     }
 
 
+@pytest.mark.parametrize(
+    ("name", "other"),
+    [("rudder_rad", ""), ("yaw_rate_rad_per_s", ""), ("alpha_rad", "sideslip_rad")],
+)
+def test_a_reversed_or_exchanged_channel_is_named(tmp_path: Path, name: str, other: str) -> None:
+    """It was a gap that no effect explains, after a search of up to 46 s."""
+    record, _ = import_log(flown(tmp_path, {"/Cmq": 0.7}, 16.0, rate_Hz=30.0)[0])
+    data = record.data.copy()
+    if other:
+        pair = [record.channels.index(one) for one in (name, other)]
+        data[:, pair] = data[:, pair[::-1]]
+    else:
+        data[:, record.channels.index(name)] *= -1.0
+    question = f"is it exchanged with {other}" if other else "is its sign reversed"
+    with pytest.raises(InputError, match=rf"log: {name}: {question}\? So read, the record fits"):
+        diagnose(alone(), {"log": Record(record.channels, data)})
+
+
 def test_a_fault_of_the_forces_is_not_judged_by_an_aircraft_alone(healthy: Record) -> None:
     forced = Record(
         (*healthy.channels, "column_force_N", "column_computed_m"),
