@@ -77,8 +77,10 @@ OFFSET = replace(
 )
 
 
-def text_of(budget: StageBudget, *effects: EffectResult, stage: StageResult = LOADER) -> str:
-    found = Findings("column", "mostly", (stage,), effects, (), (), (budget,))
+def text_of(
+    budget: StageBudget, *effects: EffectResult, rivals: tuple[tuple[str, ...], ...] = ()
+) -> str:
+    found = Findings("column", "mostly", (LOADER,), effects, rivals, (), (budget,))
     shrink = Shrink(ChannelShrink("column_computed_m", 1.0, 0.1, 0.1, 4), ())
     return summary(found, shrink, "", "", "")
 
@@ -99,6 +101,18 @@ def test_a_number_is_set_only_where_its_effect_is_credible() -> None:
     text = text_of(budget, replace(FRICTION, probability=0.9), OFFSET)
     assert text.count("Set ") == 1
     assert "Probabilities: coulomb friction 0.90, force offset 0.30." in text
+
+
+@pytest.mark.parametrize(("probability", "numbers"), [(0.35, 2), (0.0, 1)])
+def test_a_number_is_set_where_an_effect_is_credible_with_its_alternatives(
+    probability: float, numbers: int
+) -> None:
+    """A pitch stiffness of probability 0.00 was to be set, for its alternative, in turbulence."""
+    shares = (share("coulomb_friction", 0.8), share("force_offset", 0.1))
+    budget = StageBudget("loader", shares, share("unexplained", 0.1), share("noise", 0.0))
+    effects = replace(FRICTION, probability=0.9), replace(OFFSET, probability=probability)
+    text = text_of(budget, *effects, rivals=(("force_offset", "breakout"),))
+    assert text.count("Set ") == numbers
 
 
 @pytest.mark.parametrize("shown_in", [("loader",), ()])

@@ -194,11 +194,11 @@ def capital(text: str) -> str:
 
 
 def _set(found: Findings) -> str:
-    """Return which values to set in host and rig file; of no effect that is not credible."""
+    """Return which values to set in host and rig file; of no effect or group that is uncertain."""
     if found.verdict not in ("effect", "mostly"):
         return ""
-    open_ones = {name for group in found.rivals for name in group}
-    known = [e for e in found.effects if e.probability >= CERTAIN or e.name in open_ones]
+    alike = {group[0]: len(group) for group in found.rivals}
+    known = [e for e in found.effects if e.probability * alike.get(e.name, 1) >= CERTAIN]
     numbers = [p for effect in known for p in effect.parameters if not _is_none(p)]
     keys = [p.host or f"{dotted(p.key, found.control)} in the rig file" for p in numbers]
     found_values = [f"{figure(p.found)} {p.unit}".rstrip() for p in numbers]
