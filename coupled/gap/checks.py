@@ -47,7 +47,6 @@ from coupled.record.channels import (
     TIME,
     ControlName,
     channel,
-    motion_channels,
 )
 from coupled.record.importing import plausible
 from coupled.record.importing.account import log_rate_of
@@ -438,16 +437,41 @@ def _measured_trim(rig: Rig, record: Record, file: str) -> dict[str, Any]:
 
 def trim_speed(rig: Rig) -> float:
     """Return the true airspeed at which the rig's aircraft is trimmed, m/s."""
+    return _in_trim(rig, SPEED)
+
+
+def other_air(rig: Rig, record: Record, file: str) -> str:
+    """Return a sentence on air whose density is not the model's at the record's altitude.
+
+    The aircraft's forces in such air are those of another mass with other inertias.
+    """
+    names = (PRESSURE, SPEED, ALTITUDE)
+    if any(name not in record for name in names):
+        return ""
+    measured = plausible.pressure_ratio(*(record[name] for name in names))
+    own = plausible.pressure_ratio(*(np.array([_in_trim(rig, name)]) for name in names))
+    if measured is None or own is None or abs(measured / own - 1.0) <= NEGLIGIBLE:
+        return ""
+    return (
+        f"By q̄ and airspeed of {file} the density of the air is {measured / own:.3f} times the "
+        "model's, which acts as a factor on mass and inertias: check altitude (above sea level), "
+        'airspeed (true) and temperature ("atmosphere/delta-T" in flight.properties, °R).'
+    )
+
+
+def _in_trim(rig: Rig, name: str) -> float:
+    """Return a channel of the motion of the rig's aircraft in trim."""
     assert rig.flight is not None
     still = changed(rig.flight, STILL, rig.name, "flight")
-    return _trim_speed(still.model_dump_json(), rig.frame_rate, rig.name)
+    motion = _trim_motion(still.model_dump_json(), rig.frame_rate, rig.name)
+    return motion[LONGITUDINAL.index(name)]
 
 
 @lru_cache(maxsize=64)
-def _trim_speed(flight: str, rate_Hz: float, name: str) -> float:
+def _trim_motion(flight: str, rate_Hz: float, name: str) -> tuple[float, ...]:
     still = Flight.model_validate_json(flight)
     airframe = make_aircraft(still, 1.0 / rate_Hz, ["column"], [aircraft_folder()], name)
-    return airframe.motion()[motion_channels(["column"], flown=True).index(SPEED)]
+    return tuple(airframe.motion())
 
 
 def motion_alone(records: Mapping[str, Record]) -> dict[str, Record]:

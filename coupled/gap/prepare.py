@@ -38,6 +38,7 @@ from coupled.gap.checks import (
     clipped,
     motion_alone,
     not_measured,
+    other_air,
     trim_speed,
     trimmed,
 )
@@ -138,8 +139,9 @@ def prepare(
     left_out = [*(why for one in live for why in one.left_out), *repeated]
     for file, record in records.items() if part.own else ():
         left_out += clipped(record, control, file)
-    if any(output.stage == AIRFRAME for output in outputs) and (words := not_judged(each)):
-        left_out.append(words)
+    if any(output.stage == AIRFRAME for output in outputs):
+        said = (not_judged(each), *(other_air(rig, one, file) for file, one in records.items()))
+        left_out += [words for words in said if words]
     library = [one for one in library_of(rig, control) if part.frees(keys_of([one]))]
     if terms and part.airframe:
         library = with_terms(library, rig, records)

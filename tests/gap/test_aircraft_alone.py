@@ -11,7 +11,7 @@ import pytest
 from coupled import diagnose as judge
 from coupled import fit, load_rig
 from coupled.errors import InputError
-from coupled.gap.checks import at_rate_of, motion_alone, trimmed
+from coupled.gap.checks import at_rate_of, motion_alone, other_air, trimmed
 from coupled.gap.diagnose import diagnose
 from coupled.gap.findings.diagnosis import Diagnosis
 from coupled.gap.findings.flown import fly_force
@@ -123,6 +123,19 @@ def test_a_reversed_or_exchanged_channel_is_named(tmp_path: Path, name: str, oth
     question = f"is it exchanged with {other}" if other else "is its sign reversed"
     with pytest.raises(InputError, match=rf"log: {name}: {question}\? So read, the record fits"):
         diagnose(alone(), {"log": Record(record.channels, data)})
+
+
+def test_air_of_another_density_is_named(healthy: Record) -> None:
+    """A hot day, or an altitude above the ground, was a mass and three inertias of 0.89 each."""
+    rig, _ = trimmed(at_rate_of(alone(), {"log": healthy}), {"log": healthy})
+    standard = 1.0902 * 0.5 * healthy["true_airspeed_m_per_s"] ** 2  # at 1200 m
+
+    def words(density: float) -> str:
+        data = np.column_stack([healthy.data, density * standard])
+        return other_air(rig, Record((*healthy.channels, "dynamic_pressure_Pa"), data), "log")
+
+    assert words(1.0) == other_air(rig, healthy, "log") == ""
+    assert "the density of the air is 0.940 times the model's" in words(0.94)
 
 
 def test_a_fault_of_the_forces_is_not_judged_by_an_aircraft_alone(healthy: Record) -> None:
