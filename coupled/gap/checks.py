@@ -25,6 +25,7 @@ from coupled.flight.aircraft import make_aircraft
 from coupled.flight.altered import STILL
 from coupled.gap.signals.output import Floats, Output
 from coupled.gap.signals.reading import PRESSURE
+from coupled.gap.stages.openloop import throttles_of
 from coupled.gap.stages.surfaces import surface_channel, surface_points
 from coupled.gap.thresholds import (
     DOUBLED,
@@ -475,7 +476,7 @@ def _trim_motion(flight: str, rate_Hz: float, name: str) -> tuple[float, ...]:
 
 
 def motion_alone(records: Mapping[str, Record]) -> dict[str, Record]:
-    """Return the records with time, surface positions and motion only.
+    """Return the records with time, surface and throttle positions, and motion only.
 
     Raises InputError if one lacks the elevator position or the pitch rate.
     """
@@ -486,6 +487,7 @@ def motion_alone(records: Mapping[str, Record]) -> dict[str, Record]:
                 problem = "is missing; the rig has an aircraft only, and is judged by it"
                 raise InputError(file, name, problem)
         kept = [name for name in (TIME, *LONGITUDINAL, *LATERAL) if name in record]
+        kept += throttles_of(record)
         data = np.column_stack([record[name] for name in kept])
         found[file] = Record(tuple(kept), data, record.manifest)
     return found

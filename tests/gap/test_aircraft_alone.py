@@ -16,6 +16,7 @@ from coupled.gap.diagnose import diagnose
 from coupled.gap.findings.diagnosis import Diagnosis
 from coupled.gap.findings.flown import fly_force
 from coupled.gap.stages.airframe import airframe_outputs
+from coupled.gap.stages.openloop import is_throttled
 from coupled.record.importing.convert import import_log
 from coupled.record.record import Record
 from coupled.resources import shipped_rigs
@@ -144,6 +145,14 @@ def test_a_fault_of_the_forces_is_not_judged_by_an_aircraft_alone(healthy: Recor
         np.column_stack([healthy.data, np.ones((len(healthy), 2))]),
     )
     assert motion_alone({"log": forced})["log"].channels == healthy.channels
+
+
+def test_a_throttle_that_moves_is_seen_by_an_aircraft_alone(healthy: Record) -> None:
+    """Its channel was left out, and so the speed judged by the throttle in trim."""
+    throttle = 0.5 + 0.2 * (healthy.time_s > 5.0)
+    names = (*healthy.channels, "throttle_norm")
+    given = Record(names, np.column_stack([healthy.data, throttle]))
+    assert is_throttled(motion_alone({"log": given})["log"])
 
 
 def test_a_rig_takes_the_frame_rate_of_a_log_and_keeps_its_own_steps(healthy: Record) -> None:

@@ -282,8 +282,12 @@ def lacking(record: Record) -> tuple[str, ...]:
 
 def is_throttled(record: Record) -> bool:
     """Tell whether a throttle moves in a record; that of the model stays as in trim."""
-    throttles = (record[name] for name in record.channels if "throttle" in name)
-    return any(float(np.ptp(one)) > NEGLIGIBLE for one in throttles)
+    return any(float(np.ptp(record[name])) > NEGLIGIBLE for name in throttles_of(record))
+
+
+def throttles_of(record: Record) -> list[str]:
+    """Return the channels of a record's throttles, which are a user's own."""
+    return [name for name in record.channels if "throttle" in name]
 
 
 def not_judged(records: Sequence[Record]) -> str:
