@@ -29,6 +29,7 @@ from coupled.gap.stages.openloop import throttles_of
 from coupled.gap.stages.surfaces import surface_channel, surface_points
 from coupled.gap.thresholds import (
     DOUBLED,
+    FAR_SIGMAS,
     NEGLIGIBLE,
     OTHER_SPEED,
     PIECE,
@@ -439,6 +440,19 @@ def _measured_trim(rig: Rig, record: Record, file: str) -> dict[str, Any]:
 def trim_speed(rig: Rig) -> float:
     """Return the true airspeed at which the rig's aircraft is trimmed, m/s."""
     return _in_trim(rig, SPEED)
+
+
+def not_in_trim(record: Record, file: str) -> str:
+    """Return a sentence on a rate that is not 0 at a record's start, where the model is in trim."""
+    for name in (one for one in RATE.values() if one in record):
+        start, signal = start_of(record, name), record[name]
+        least = FAR_SIGMAS * plausible.noise_level(signal) / math.sqrt(SHORT_FRAMES)
+        if abs(start) > max(least, SMALL * float(np.std(signal))):
+            return (
+                f"{file} does not start in trim, from which the model is flown, or a sensor has an "
+                f"offset: {name} starts at {start:.3g}. Give the record from its trim on."
+            )
+    return ""
 
 
 def other_air(rig: Rig, record: Record, file: str) -> str:

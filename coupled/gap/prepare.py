@@ -37,6 +37,7 @@ from coupled.gap.checks import (
     check_units,
     clipped,
     motion_alone,
+    not_in_trim,
     not_measured,
     other_air,
     trim_speed,
@@ -140,8 +141,8 @@ def prepare(
     for file, record in records.items() if part.own else ():
         left_out += clipped(record, control, file)
     if any(output.stage == AIRFRAME for output in outputs):
-        said = (not_judged(each), *(other_air(rig, one, file) for file, one in records.items()))
-        left_out += [words for words in said if words]
+        left_out += [not_judged(each), *(not_in_trim(one, file) for file, one in records.items())]
+        left_out += [other_air(rig, one, file) for file, one in records.items()]
     library = [one for one in library_of(rig, control) if part.frees(keys_of([one]))]
     if terms and part.airframe:
         library = with_terms(library, rig, records)
@@ -152,7 +153,7 @@ def prepare(
         tuple(judged.readers),
         records,
         trim,
-        tuple(dict.fromkeys(left_out)),
+        tuple(dict.fromkeys(words for words in left_out if words)),
         baseline,
         bool(repeated) and baseline is None,
     )

@@ -11,10 +11,12 @@ import pytest
 from coupled import diagnose as judge
 from coupled import fit, load_rig
 from coupled.errors import InputError
-from coupled.gap.checks import at_rate_of, motion_alone, other_air, trimmed
+from coupled.gap.chain import Part
+from coupled.gap.checks import at_rate_of, motion_alone, not_in_trim, other_air, trimmed
 from coupled.gap.diagnose import diagnose
 from coupled.gap.findings.diagnosis import Diagnosis
 from coupled.gap.findings.flown import fly_force
+from coupled.gap.prepare import prepare
 from coupled.gap.stages.airframe import airframe_outputs
 from coupled.gap.stages.openloop import is_throttled
 from coupled.record.importing.convert import import_log
@@ -26,6 +28,8 @@ from tests.support.airframes import motion_of, noisy, pulses
 from tests.support.commands import coupled
 from tests.support.ownlogs import flightgear_log, flown
 from tests.support.rigs import bench
+
+AIRFRAME = Part("column", own=False)
 
 
 def alone(name: str = "c172p") -> Rig:
@@ -124,6 +128,17 @@ def test_a_reversed_or_exchanged_channel_is_named(tmp_path: Path, name: str, oth
     question = f"is it exchanged with {other}" if other else "is its sign reversed"
     with pytest.raises(InputError, match=rf"log: {name}: {question}\? So read, the record fits"):
         diagnose(alone(), {"log": Record(record.channels, data)})
+
+
+def test_a_log_that_starts_in_a_manoeuvre_is_named(healthy: Record) -> None:
+    """It was a gap of 195 floors, for which no sentence gave a reason."""
+    assert not_in_trim(healthy, "log") == ""
+    begun = Record(healthy.channels, healthy.data[healthy.time_s > 1.5])
+    words = not_in_trim(begun, "log")
+    assert words.startswith("log does not start in trim")
+    assert "pitch_rate_rad_per_s starts at" in words
+    (said,) = (one for one in prepare(alone(), {"log": begun}, AIRFRAME).left_out if "trim" in one)
+    assert said == words
 
 
 def test_air_of_another_density_is_named(healthy: Record) -> None:
