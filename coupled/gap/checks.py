@@ -437,6 +437,18 @@ def _measured_trim(rig: Rig, record: Record, file: str) -> dict[str, Any]:
     return found
 
 
+def unmeasured_trim(rig: Rig, records: Mapping[str, Record]) -> str:
+    """Return a sentence on a trim that no record and no manifest shows; empty if one does."""
+    flight, (file, record) = rig.flight, next(iter(records.items()))
+    if flight is None or SPEED in record or _manifest_trim(flight, record, file) is not None:
+        return ""
+    return (
+        f"Without {SPEED} the trim is the rig file's: {CALIBRATED} {flight.calibrated_airspeed:.4g}"
+        f", {ALTITUDE} {flight.altitude:.4g}. A flight from another one differs as by mass and "
+        "inertias."
+    )
+
+
 def trim_speed(rig: Rig) -> float:
     """Return the true airspeed at which the rig's aircraft is trimmed, m/s."""
     return _in_trim(rig, SPEED)

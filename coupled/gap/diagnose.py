@@ -24,6 +24,7 @@ import numpy as np
 
 from coupled.errors import InputError
 from coupled.gap.chain import AIRFRAME, STAGES, Part
+from coupled.gap.checks import unmeasured_trim
 from coupled.gap.findings.answer import effects_of, incredible, settings_of, verdict_of
 from coupled.gap.findings.budget import floors_of, shrink, stage_budget
 from coupled.gap.findings.curves import find_curves
@@ -235,6 +236,7 @@ def findings(prepared: Prepared, case: Case, choice: Choice) -> PartDiagnosis:
     fitted = Problem(case).fit(fit.effects, fit.values, descent=Descent("own"), part="fitted")
     floors = floors_of(case, choice)
     faulty = [stage.name for stage in stages if stage.guilty]
+    unknown = unmeasured_trim(case.nominal, prepared.records) if AIRFRAME in faulty else ""
     budgets = [stage_budget(name, case, choice.without_effects, fit, floors) for name in faulty]
     budget = tuple(one for one in budgets if one is not None)
     change = None
@@ -272,7 +274,7 @@ def findings(prepared: Prepared, case: Case, choice: Choice) -> PartDiagnosis:
         change=change,
         trim=prepared.trim,
         filtered={name: one for each in filtered for name, one in each},
-        left_out=prepared.left_out,
+        left_out=tuple(words for words in (*prepared.left_out, unknown) if words),
         inseparable=inseparable(fit, case.control),
         curved=curves,
     )

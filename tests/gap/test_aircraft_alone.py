@@ -12,11 +12,19 @@ from coupled import diagnose as judge
 from coupled import fit, load_rig
 from coupled.errors import InputError
 from coupled.gap.chain import Part
-from coupled.gap.checks import at_rate_of, motion_alone, not_in_trim, other_air, trimmed
-from coupled.gap.diagnose import diagnose
+from coupled.gap.checks import (
+    at_rate_of,
+    motion_alone,
+    not_in_trim,
+    other_air,
+    trimmed,
+    unmeasured_trim,
+)
+from coupled.gap.diagnose import diagnose, findings
 from coupled.gap.findings.diagnosis import Diagnosis
 from coupled.gap.findings.flown import fly_force
 from coupled.gap.prepare import prepare
+from coupled.gap.search.histories import search
 from coupled.gap.stages.airframe import airframe_outputs
 from coupled.gap.stages.openloop import is_throttled
 from coupled.record.importing.convert import import_log
@@ -139,6 +147,16 @@ def test_a_log_that_starts_in_a_manoeuvre_is_named(healthy: Record) -> None:
     assert "pitch_rate_rad_per_s starts at" in words
     (said,) = (one for one in prepare(alone(), {"log": begun}, AIRFRAME).left_out if "trim" in one)
     assert said == words
+
+
+def test_a_trim_that_no_channel_shows_is_named_beside_a_gap(healthy: Record) -> None:
+    """A flight at 52 m/s, by a file of 46, was another mass and another pitch inertia."""
+    lacking = without(healthy, "true_airspeed_m_per_s")
+    words = unmeasured_trim(alone(), {"log": lacking})
+    assert "calibrated_airspeed_m_per_s 46.3, altitude_m 1500" in words
+    assert unmeasured_trim(alone(), {"log": healthy}) == ""
+    made = prepare(alone(), {"log": lacking}, AIRFRAME)
+    assert words in findings(made, *search(made.case, [])).left_out
 
 
 def test_air_of_another_density_is_named(healthy: Record) -> None:
