@@ -247,7 +247,8 @@ def test_terms_without_an_aircraft_are_refused(healthy: Record) -> None:
 def test_a_log_that_was_imported_beside_a_rig_is_trimmed_as_it_begins(tmp_path: Path) -> None:
     """The rig of an import is what the log was compared with, not what was flown."""
     log = Path(__file__).parents[1] / "data" / "JSBout.csv"
-    record, _ = import_log(log, None, alone())
+    record, account = import_log(log, None, alone())
+    assert account.clock.frame_rate_Hz == 30.0  # an aircraft alone has no host whose frames count
     manifest = {"rig": json.loads(alone().model_dump_json()), "imported_from": log.name}
     known = Record(record.channels, record.data, manifest)
     rig, said = trimmed(at_rate_of(alone(), {"log": known}), {"log": known})

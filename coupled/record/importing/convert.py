@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from coupled.errors import InputError
 from coupled.files import sha256
 from coupled.record.channels import TIME
+from coupled.record.importing import plausible
 from coupled.record.importing.account import ChannelAccount, ImportAccount
 from coupled.record.importing.clock import Grid, on_frames
 from coupled.record.importing.heads import known_map
@@ -34,7 +35,6 @@ from coupled.schema import LARGEST, SMALLEST
 from coupled.units import parse_unit
 
 Floats = NDArray[np.float64]
-TURNING = ("roll_rad", "heading_rad")  # angles that wrap
 
 
 def import_log(
@@ -44,8 +44,9 @@ def import_log(
 
     The first log's rows make the frames; a channel of another log is interpolated by its own
     stamps, and the record covers the time common to all. The record's manifest has the account
-    too. Without a map the log must be of a program with known heads. A `rig` gives the frame rate,
-    and its travels and force gradients are compared with the channels. Raises InputError.
+    too. Without a map the log must be of a program with known heads. A `rig` with controls gives
+    the frame rate of its host. Travels and force gradients of a rig are compared with the channels.
+    Raises InputError.
     """
     files = [log_file] if isinstance(log_file, Path) else list(log_file)
     inputs = [*files, *([map_file] if map_file else [])]
@@ -59,7 +60,7 @@ def import_log(
     log_map = log_map.model_copy(update={"channels": read})
     logs = read_logs(files, log_map, map_file)
     main = next(iter(logs.values()))
-    rate = rig.frame_rate if rig is not None else None
+    rate = rig.frame_rate if rig is not None and rig.controls else None
     asked = log_map.clock.frame_rate
     if rate is not None and asked is not None and abs(asked / rate - 1.0) > 1e-3:
         problem = f"is {asked:g}, the rig's {rate:g}; leave it out to take the rig's"
@@ -177,7 +178,7 @@ def _check_gaps(log: Log, log_map: LogMap, name: str, grid: Grid, values: Floats
 
 
 def _on_frames(name: str, grid: Grid, values: Floats, delay_s: float) -> Floats:
-    if name not in TURNING:
+    if name not in plausible.TURNING:
         return on_frames(grid, values, delay_s, held=name.endswith("_stop"))
     # Interpolate across the wrap: 0° between 359° and 1°, not 180°.
     turn = 2.0 * np.pi

@@ -41,6 +41,7 @@ REGULAR = 0.8  # share of steps that a sensor of a slower rate has at its own pe
 JUMP = 10.0  # standard deviations of noise; two rows of noise differ by half of it in 1 of 2500
 SMALL_STEP = 0.2  # of the range: largest other step of a position from row to row
 
+TURNING = ("roll_rad", "heading_rad")  # angles that wrap
 # Bounds of channels of a rig or a transport aircraft in normal flight.
 _BOUNDS: dict[str, tuple[float, float]] = {
     "force_N": (-2500.0, 2500.0),
