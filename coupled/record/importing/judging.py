@@ -69,6 +69,7 @@ def judge(
 
 
 def _by_itself(name: str, values: Floats) -> list[str]:
+    values = np.unwrap(values) if name in plausible.TURNING else values
     doubts = []
     clip = plausible.clipped_at(values)
     if clip is not None:

@@ -15,6 +15,7 @@ from scipy import io as scipy_io
 from coupled.errors import InputError
 from coupled.record.importing import plausible
 from coupled.record.importing.convert import import_log
+from coupled.record.importing.judging import judge
 from coupled.record.importing.mapping import CHANNELS, factor_of, own_unit
 from coupled.resources import shipped_rigs
 from coupled.rig.rigfile import read_rig
@@ -280,6 +281,13 @@ def test_a_control_that_is_moved_fast_says_nothing_of_its_force_s_unit() -> None
         if ratio is not None:
             assert ratio == pytest.approx(1.0, rel=0.03)
             assert plausible.in_pounds(plausible.force_ratio(force / 4.448, moved, gradient) or 0.0)
+
+
+def test_a_heading_that_wraps_has_no_spikes() -> None:
+    time_s = np.arange(600) / 60.0
+    noise = np.random.default_rng(1).normal(0.0, 5e-4, 600)
+    known = {"heading_rad": np.mod(0.02 * np.sin(time_s) + noise, 2.0 * np.pi)}
+    assert judge(known, known, time_s, None, "log")["heading_rad"].doubts == ()
 
 
 def test_a_force_in_pounds_is_seen_against_the_rig(tmp_path: Path) -> None:
