@@ -457,8 +457,10 @@ def trim_speed(rig: Rig) -> float:
 def not_in_trim(record: Record, file: str) -> str:
     """Return a sentence on a rate that is not 0 at a record's start, where the model is in trim."""
     for name in (one for one in RATE.values() if one in record):
-        start, signal = start_of(record, name), record[name]
-        least = FAR_SIGMAS * plausible.noise_level(signal) / math.sqrt(SHORT_FRAMES)
+        signal = record[name]
+        # The first value of a line, as in a gust a rate grows from 0; twice the error of a mean.
+        start = float(np.polyfit(np.arange(SHORT_FRAMES), signal[:SHORT_FRAMES], 1)[1])
+        least = FAR_SIGMAS * 2.0 * plausible.noise_level(signal) / math.sqrt(SHORT_FRAMES)
         if abs(start) > max(least, SMALL * float(np.std(signal))):
             return (
                 f"{file} does not start in trim, from which the model is flown, or a sensor has an "
