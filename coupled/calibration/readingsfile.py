@@ -194,8 +194,10 @@ def number_in(path: Path, row: int, column: str, cell: str) -> float:
         hint = "; write it with a point" if "," in cell else ""
         raise InputError(path, place, f"{shown!r} is no number{hint}")
     number = float(cell)
-    if not math.isfinite(number) or abs(number) > LARGEST:
+    if not math.isfinite(number):
         raise InputError(path, place, f"{cell[:40]!r} is no finite number")
+    if abs(number) > LARGEST:
+        raise InputError(path, place, f"{cell[:40]!r} is larger than any real one")
     if 0.0 < abs(number) < SMALLEST:
         raise InputError(path, place, f"{cell[:40]!r} is smaller than any real one; give 0")
     return number

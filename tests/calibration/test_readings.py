@@ -103,6 +103,7 @@ HOSTILE = [
         "row 3: force_lb: '12,8' is no number; write it with a",
     ),
     (CSV.replace("54.23", "nan"), "row 3: v1_V: 'nan' is no finite number"),
+    (CSV.replace("54.23", "1e300"), "row 3: v1_V: '1e300' is larger than any real one"),
     (CSV.replace("54.23", "inf"), "row 3: v1_V"),
     (CSV.replace("54.23", "1e300"), "row 3: v1_V"),
     (CSV.replace("54.23", "9" * 5000), "row 3: v1_V"),
