@@ -37,6 +37,7 @@ MOVES = (0.5, 0.25, 0.125, 0.0625)  # of the grid's step
 EXACT = 1e-9  # of the largest force: a smaller residual is rounding
 LEAST_READINGS = 8
 READINGS = 400  # of a sweep at one q̄: more rows are averaged, so that a fit takes seconds
+LOOSE = 0.05  # of the largest force: a larger residual RMS is no fit
 STEADY = 0.05  # of q̄: a larger change is another sweep
 
 
@@ -83,6 +84,15 @@ class Feel:
     rms_N: float
     sweep: Sweep
     used: NDArray[np.bool_]
+
+    def doubts(self, control: ControlName) -> list[str]:
+        """Return doubts about the forces, and about a curve that does not follow them."""
+        most = float(np.max(np.abs(self.sweep.force[self.used])))
+        found = self.sweep.doubts(control)
+        if self.rms_N > LOOSE * most:
+            share = f"the residual RMS is {100.0 * self.rms_N / most:.0f} % of the largest"
+            found.append(f"{channel(control, 'force')}: no rising curve fits the forces: {share}")
+        return found
 
     def at(self, deflection: Floats, row: int, motion: float) -> Floats:
         """Return the fitted force in N at δ in d, at one of the pressures; motion −1, 0 or 1."""
@@ -325,7 +335,7 @@ def feel_text(feel: Feel, control: ControlName, source: str) -> str:
         return "[" + ", ".join(repr(float(f"{value:.5g}") + 0.0) for value in values) + "]"
 
     rows = ",\n  ".join(listed(row) for row in feel.force)
-    doubts = "".join(f"# Doubtful: {doubt}.\n" for doubt in feel.sweep.doubts(control))
+    doubts = "".join(f"# Doubtful: {doubt}.\n" for doubt in feel.doubts(control))
     return f"""# Breakout, friction and curve of {source}, for a rig file in place of its own keys.
 # The residual of the readings is {feel.rms_N:.3g} N RMS.
 {doubts}

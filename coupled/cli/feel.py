@@ -47,7 +47,7 @@ def print_feel(feel: Feel, control: ControlName, file: Path, units: System = "si
     segments = len(feel.deflection) - 1
     sides = "for both sides" if feel.deflection[0] == 0.0 else "over both sides"
     say(f"{'curve':13}{segments} segments {sides}, at {len(feel.pressure)} q̄")
-    for doubt in feel.sweep.doubts(control):
+    for doubt in feel.doubts(control):
         say_note(doubt)
     plot = file.with_suffix(".png")
     say(f"written: {file}, {plot}")

@@ -191,6 +191,16 @@ def test_a_gauge_that_saturates_is_doubtful(tmp_path: Path) -> None:
     assert "# Doubtful: column_force_N: clipped at 60" in (tmp_path / "cut.toml").read_text("utf-8")
 
 
+def test_forces_that_no_rising_curve_fits_are_doubtful(tmp_path: Path) -> None:
+    assert fitted(column_sweep(tmp_path)).doubts("column") == []
+    at, _ = swept(-0.1, 0.1)
+    rows = [f"{d:.5f},{50.0 * np.sin(30.0 * d):.3f}" for d in at]
+    path = tmp_path / "waves.csv"
+    path.write_text("\n".join(["deflection_m,force_N", *rows]) + "\n", encoding="utf-8")
+    (doubt,) = fitted(path).doubts("column")
+    assert "no rising curve fits the forces: the residual RMS is " in doubt
+
+
 def test_the_command_writes_a_schedule_that_a_rig_takes(tmp_path: Path) -> None:
     column_sweep(tmp_path)
     done = coupled(tmp_path, "new", "feel", "sweep.csv", "feel.toml")
