@@ -204,6 +204,9 @@ def _check(path: Path, numbers: Sequence[int], sweep: Sweep, control: ControlNam
             problem = f"has {count} of its readings{where} beyond {NEUTRAL:.0%} of the largest"
             problem += f" deflection, {most}; {LEAST_READINGS} are needed: is that one in another"
             raise InputError(path, "", f"{problem} unit?")
+        if np.count_nonzero(sweep.motion[here]) < 0.5 * np.count_nonzero(here):
+            problem = f"turns at most of its readings{where}: give them in the order of the sweep,"
+            raise InputError(path, "", f"{problem} or a column direction, of out and back")
         for way, word in ((1.0, "out"), (-1.0, "back")):
             if not np.any(outward[here] == way):
                 problem = f"holds no reading on the way {word}{where}; sweep out and back"

@@ -82,6 +82,16 @@ def test_the_readings_of_a_fit_are_limited_by_means(tmp_path: Path) -> None:
     assert found.rms_N == pytest.approx(NOISE_N / np.sqrt(10.0), rel=0.2)
 
 
+def test_readings_in_another_order_than_the_sweeps_are_refused(tmp_path: Path) -> None:
+    """Their friction was 0, since all of them seemed to turn."""
+    path = column_sweep(tmp_path)
+    head, *rows = path.read_text().splitlines()
+    shuffled = np.random.default_rng(2).permutation(rows).tolist()
+    path.write_text("\n".join([head, *shuffled]) + "\n")
+    with pytest.raises(InputError, match=r"turns at most of its readings.*order of the sweep"):
+        read_sweep(path, "column")
+
+
 def test_exact_readings_give_the_exact_curve(tmp_path: Path) -> None:
     found = fitted(column_sweep(tmp_path, noise=0.0))
     assert found.breakout_N == pytest.approx(BREAKOUT_N, abs=0.05)
