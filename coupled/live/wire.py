@@ -22,6 +22,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from coupled.live.link import Measured, Order, Reach, Sample
+from coupled.schema import LARGEST
 
 MAGIC, VERSION = b"CPLD", 1
 STATE, ORDER = 1, 2
@@ -102,7 +103,10 @@ def unpack_state(packet: bytes, reaches: Sequence[Reach]) -> tuple[Header, Sampl
             finite = math.isfinite(measured.force) and math.isfinite(measured.computed)
             raise BadPacketError("out of range" if finite else "not a number")
         found.append(measured)
-    return header, Sample(tuple(found), 1e-6 * header.time_us)
+    time_s = 1e-6 * header.time_us
+    if time_s > LARGEST:  # no record with it could be read
+        raise BadPacketError("out of range")
+    return header, Sample(tuple(found), time_s)
 
 
 def unpack_orders(packet: bytes, controls: int) -> tuple[Header, tuple[Order, ...]]:

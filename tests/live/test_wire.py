@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import struct
 import zlib
+from dataclasses import replace
 
 import pytest
 from hypothesis import example, given, settings
@@ -88,6 +89,12 @@ def test_one_or_two_flipped_bits_are_detected(one: int, other: int) -> None:
 def test_a_measurement_beyond_any_loader_is_dropped(measured: Measured, reason: str) -> None:
     with pytest.raises(BadPacketError, match=reason):
         unpack_state(pack_state(HEADER, [measured]), REACHES)
+
+
+def test_a_clock_that_no_record_can_have_is_dropped() -> None:
+    packet = pack_state(replace(HEADER, time_us=2**63), [Measured(0.0, 0.0)])
+    with pytest.raises(BadPacketError, match="out of range"):
+        unpack_state(packet, REACHES)
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(1, 2**31 - 1))
