@@ -32,6 +32,7 @@ from coupled.gap.findings.diagnosis import Diagnosis, PartDiagnosis, WholeDiagno
 from coupled.gap.findings.healthy import Baseline, beside_healthy
 from coupled.gap.findings.judge import Judge
 from coupled.gap.findings.result import StageResult
+from coupled.gap.findings.where import lone_channel
 from coupled.gap.prepare import Prepared, prepare
 from coupled.gap.search.case import Case, Tell
 from coupled.gap.search.descent import Descent
@@ -246,6 +247,7 @@ def findings(prepared: Prepared, case: Case, choice: Choice) -> PartDiagnosis:
     verdict = verdict_of(choice, stages, effects, budget)
     if prepared.by_recorder and effects:
         verdict = "ambiguous"
+    lone = lone_channel(outputs, case.nominal) if verdict == "unexplained" else ""
     verdict, stages = beside_healthy(verdict, stages, baseline, change)
     curves = None
     if part.own and verdict in ("mostly", "unexplained"):
@@ -274,7 +276,7 @@ def findings(prepared: Prepared, case: Case, choice: Choice) -> PartDiagnosis:
         change=change,
         trim=prepared.trim,
         filtered={name: one for each in filtered for name, one in each},
-        left_out=tuple(words for words in (*prepared.left_out, unknown) if words),
+        left_out=tuple(words for words in (*prepared.left_out, lone, unknown) if words),
         inseparable=inseparable(fit, case.control),
         curved=curves,
     )

@@ -23,6 +23,7 @@ from coupled.gap.checks import (
 from coupled.gap.diagnose import diagnose, findings
 from coupled.gap.findings.diagnosis import Diagnosis
 from coupled.gap.findings.flown import fly_force
+from coupled.gap.findings.where import lone_channel
 from coupled.gap.prepare import prepare
 from coupled.gap.search.histories import search
 from coupled.gap.stages.airframe import airframe_outputs
@@ -38,6 +39,7 @@ from tests.support.ownlogs import flightgear_log, flown
 from tests.support.rigs import bench
 
 AIRFRAME = Part("column", own=False)
+_RATES = ("yaw_rate_rad_per_s", "roll_rate_rad_per_s")
 
 
 def alone(name: str = "c172p") -> Rig:
@@ -157,6 +159,22 @@ def test_a_trim_that_no_channel_shows_is_named_beside_a_gap(healthy: Record) -> 
     assert unmeasured_trim(alone(), {"log": healthy}) == ""
     made = prepare(alone(), {"log": lacking}, AIRFRAME)
     assert words in findings(made, *search(made.case, [])).left_out
+
+
+@pytest.mark.parametrize(("names", "told"), [(_RATES[:1], True), (_RATES, False)])
+def test_a_channel_that_alone_has_a_gap_is_named(
+    healthy: Record, names: tuple[str, ...], told: bool
+) -> None:
+    """A gyro with a scale was a gap of the airframe, without the name of its channel."""
+    scales = np.array([1.3 if name in names else 1.0 for name in healthy.channels])
+    data = healthy.data * scales
+    data[:, 1:] += np.random.default_rng(1).normal(0.0, 1e-3, data[:, 1:].shape)
+    record = Record(healthy.channels, data)
+    rig, _ = trimmed(at_rate_of(alone(), {"log": record}), {"log": record})
+    outputs = airframe_outputs(rig, record)
+    words = lone_channel(outputs, rig)
+    assert ("Of the motion yaw_rate_rad_per_s alone has a gap" in words) is told
+    assert (words != "") is told
 
 
 def test_air_of_another_density_is_named(healthy: Record) -> None:

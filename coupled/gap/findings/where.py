@@ -18,7 +18,7 @@ the loud share of the windows excited no more.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations, pairwise
 from typing import Any
@@ -26,11 +26,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from coupled.gap.chain import AIRFRAME as FLOWN
 from coupled.gap.noise.lines import SeenLine, widest_line
 from coupled.gap.noise.noise import filtered, of_second_order
 from coupled.gap.noise.smooth import rate_of, smoothed
 from coupled.gap.search.course import Bounds
-from coupled.gap.signals.output import Floats, Output
+from coupled.gap.signals.output import TRIM, Floats, Output
 from coupled.gap.signals.reading import PRESSURE
 from coupled.gap.thresholds import (
     BENDS,
@@ -211,6 +212,25 @@ def where(output: Output, rig: Rig, record: Record, control: ControlName) -> Whe
         by_pressure=_by(left, smoothed(record[PRESSURE])) if varies else (),
         line=widest_line(left, output.floor, rate_Hz),
         **vars(in_time(left, drives, rate_Hz)),
+    )
+
+
+def lone_channel(outputs: Sequence[Output], rig: Rig) -> str:
+    """Return a sentence on the only channel of the motion with a gap; empty if there are others.
+
+    An error of the aircraft's forces shows in several, of which a small one may exceed the limit of
+    one alone. The trim alone may be off by one of them.
+    """
+    judged = [one for one in outputs if one.stage == FLOWN and one.channel != TRIM]
+    clear = {one.channel for one in judged if one.gap(rig) <= one.limit}
+    with_gap = {one.channel for one in judged} - clear
+    distinct = any(one.gap(rig) > DOUBLED * one.limit for one in judged)
+    if len(with_gap) != 1 or len(clear) < 2 or not distinct:
+        return ""
+    (name,) = with_gap
+    return (
+        f"Of the motion {name} alone has a gap, and {len(clear)} other channels agree with the "
+        "model: check the offset, scale, delay and place of its sensor."
     )
 
 
