@@ -7,15 +7,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from coupled.gap.effects.effect import apply
 from coupled.gap.effects.library import BY_NAME, EFFECTS
 from coupled.gap.effects.settings import Scales, in_scale
+from coupled.gap.findings.proposal import next_tests
 from coupled.gap.search.fit import fit_alone
+from coupled.gap.search.found import Candidate, Choice, Fit, Found
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points
+from coupled.gap.thresholds import RIVAL_GAIN
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
 from tests.support.joined import joined
-from tests.support.machines import plain_rig
+from tests.support.machines import plain_rig, recorded
 
 TIME_s = np.arange(600) / 100.0
 NAMES = ("time_s", "column_force_N", "column_deflection_m")
@@ -94,3 +98,24 @@ def test_friction_is_found_over_eight_decades_of_force(force: float) -> None:
     (value,) = found.values.values()
     assert not found.at_bound
     assert value / force == pytest.approx(14.0, rel=0.02)
+
+
+def test_a_test_is_proposed_by_the_sensors_that_the_record_has() -> None:
+    """Scales of force and of δc were to be told apart by a transducer that the bench lacks."""
+    rig = plain_rig(100.0, {"mass_kg": 1.0, "damping_N_s_per_m": 30.0}, 500.0)
+    effect, other = BY_NAME["deflection_scale"], BY_NAME["force_scale"]
+    fits = []
+    for one, factor in ((effect, 1.0 / 1.1), (other, 1.1)):
+        value = {one.value_key(one.free[0]): factor}
+        fits.append(Fit((one,), value, {}, {}, (), apply(rig, "column", [one], value), 0.0))
+    step = Found(effect, 9.0, 0.5, (Candidate(9.0, other, fits[1]),))
+    times = np.arange(1000) / 100.0
+    noise = np.random.default_rng(3).standard_normal((3, len(times)))
+    pull, place, grip = 20.0 * np.sin(times), 0.04 * np.sin(times), 0.04 * np.sin(times)
+    channels = {"force_N": pull + 0.05 * noise[0], "computed_m": place + 1e-5 * noise[1]}
+    gains = []
+    for more in ({}, {"deflection_m": grip + 1e-5 * noise[2]}):
+        record = recorded(100.0, **channels, **more)
+        tests = next_tests(rig, record, "column", Choice((step,), fits[0], fits[0], {}, ()))
+        gains.append(max(test.gain for test in tests))
+    assert gains[0] < RIVAL_GAIN < gains[1]

@@ -13,8 +13,8 @@ of the true one over the other.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -210,7 +210,8 @@ def next_tests(
     pushed = [c for c in nominal.controls if of_air and _is_pushed(record, c)]
     for test in (test for c in pushed or [control] for test in pushes(nominal, record, c)):
         real = _as_flown(rival.fit.rig, test.rig, control).changed({"noise": noise})
-        gain = _gain(test, real, control, pair, {**rival.fit.values, **choice.fit.values})
+        start = {**rival.fit.values, **choice.fit.values}
+        gain = _gain(test, real, control, pair, start, record.channels)
         if gain is not None:
             rivals = (step.effect.name, rival.effect.name)
             found.append(ProposedTest(test.text, rivals, gain))
@@ -238,14 +239,21 @@ def _gain(
     control: ControlName,
     pair: tuple[tuple[Effect, ...], tuple[Effect, ...]],
     start: dict[str, float],
+    recorded: Collection[str],
 ) -> float | None:
-    """Return the gain of the first set over the second on a record simulated with the first."""
+    """Return the gain of the first set over the second on a record simulated with the first.
+
+    It has the `recorded` channels: the user's bench has no other sensors.
+    """
     try:
         record = fly_force(real, {test.control: test.force_N}, test.pressure_Pa, seed=5)
     except InputError:
         return None
     if record.manifest["ended_early"]:
         return None
+    kept = [k for k, name in enumerate(record.channels) if name in recorded]
+    names = tuple(record.channels[k] for k in kept)
+    record = replace(record, channels=names, data=record.data[:, kept])
     stages = {effect.stage for effect in pair[0] + pair[1]}
     outputs = list[Output]()
     if stages != {"airframe"}:
