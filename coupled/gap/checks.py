@@ -258,7 +258,7 @@ def not_measured(record: Record, control: ControlName | None, file: str) -> list
     said = [
         f"{name} of {file} {repeats}: an effect may be the recorder's. Log it anew every frame."
         for name, signal in signals.items()
-        if (repeats := plausible.held(signal))
+        if (repeats := plausible.held(signal, in_steps="force" in name))
     ]
     log_Hz = log_rate_of(record)
     if log_Hz is not None and log_Hz < (1.0 - SMALL) * sampling_rate_of(record, file):

@@ -74,6 +74,13 @@ def test_a_sensor_that_renews_its_value_more_rarely_than_the_rows_is_named(rows:
     assert f"column_deflection_m of r.csv holds each value over {rows}" in said
 
 
+def test_a_force_that_a_bench_applies_in_steps_is_measured() -> None:
+    """A stair of force, held for a second each, had halved the probability of any effect."""
+    data = moved(1.0).data.copy()
+    data[:, 1] = data[np.arange(len(data)) // 50 * 50, 1]
+    assert not_measured(Record(NAMES, data), "column", "r.csv") == []
+
+
 def test_an_effect_beside_a_sensor_that_holds_its_value_is_as_probably_the_recorders(
     tmp_path: Path,
 ) -> None:

@@ -109,10 +109,11 @@ def held_extreme(values: Floats) -> float | None:
     return None
 
 
-def held(values: Floats) -> str:
+def held(values: Floats, in_steps: bool = False) -> str:
     """Return how a sensor repeats its value where it should have moved, or nothing.
 
-    It may renew its value every few rows, by steps far above its resolution. Or it stands still in
+    It may renew its value every few rows, by steps far above its resolution; not if the quantity
+    itself may go `in_steps`, as a force, unlike the motion of a mass. Or it stands still in
     noise that is far above its resolution, and jumps before or after: a sensor at rest does not.
     Noise is seen if its differences of fourth and sixth order agree. The largest and least values
     are not judged (`clipped_at`).
@@ -126,7 +127,12 @@ def held(values: Floats) -> str:
     spacing = np.diff(moved)
     every = float(np.median(spacing))
     regular = float(np.mean(np.abs(spacing - every) <= 1.0)) > REGULAR
-    if every >= 2.0 and regular and float(np.median(np.abs(change[moved]))) > coarse:
+    if (
+        not in_steps
+        and every >= 2.0
+        and regular
+        and float(np.median(np.abs(change[moved]))) > coarse
+    ):
         return f"holds each value over {every:g} rows"
     noise = noise_level(values)
     if noise <= max(coarse, ROUNDING * float(np.ptp(values))):
