@@ -28,13 +28,14 @@ from coupled.gap.effects.effect import (
     entry,
     fields_of,
     keys_of,
+    possible,
     section_of,
     touched,
     value,
 )
 from coupled.gap.effects.library import BY_NAME, EFFECTS, LAG
 from coupled.gap.effects.linkage import SERVO
-from coupled.gap.effects.settings import CLOCK, Scales, in_scale
+from coupled.gap.effects.settings import CLOCK, Scales, contact, in_scale, is_dry
 from coupled.gap.prepare import as_driven, readers_of
 from coupled.gap.search.case import Case, Tell
 from coupled.gap.search.fit import fit_set
@@ -42,7 +43,14 @@ from coupled.gap.search.found import Alike, Fit, alike
 from coupled.gap.signals.output import Output, Part
 from coupled.gap.stages.airframe import airframe_outputs
 from coupled.gap.stages.tried import as_judged
-from coupled.gap.thresholds import FAR, LEAST_SERVO_RATIO, NEGLIGIBLE, NORMAL_95, SERVO_START_Hz
+from coupled.gap.thresholds import (
+    FAR,
+    LEAST_SERVO_RATIO,
+    LESSER,
+    NEGLIGIBLE,
+    NORMAL_95,
+    SERVO_START_Hz,
+)
 from coupled.record.channels import ControlName
 from coupled.record.record import Record
 from coupled.results import Plain, TableResult, frame_of
@@ -326,7 +334,6 @@ def fit_nominal(
         effects = [effect for effect in effects if effect.name != worst.key]
         held, _, fitted = fitter.fitted(effects)
         numbers |= {one.key: one for one in fitted}
-    clock = CLOCK.value_key(CLOCK.free[0])
     together = [one for group in whole.groups.values() for one in alike(group)]
     found = tuple(numbers.values())
     used = [output for output in outputs if output.stage in shown_in]
@@ -337,7 +344,7 @@ def fit_nominal(
         control,
         known,
         found,
-        tuple(one for one in together if clock not in one.keys),
+        tuple(one for one in together if {*one.keys} <= {*chosen}),
         tuple(_channel(output, rig, held.rig, files[output.record]) for output in used),
         _doubts_of_servo(known, control, determined, held.rig, used),
     )
@@ -381,10 +388,12 @@ class _Fitter:
         start: Mapping[str, float] | None = None,
         part: Part = "all",
     ) -> Fit:
-        """Return effects fitted to a part of some outputs, beside a time stamp error of the force.
+        """Return effects fitted to a part of some outputs, beside nuisance parameters.
 
-        The error is a nuisance parameter within the tolerance of a recorder's clocks. Without it a
+        A time stamp error of the force is within the tolerance of a recorder's clocks. Without it a
         lag of a fraction of a frame is fitted as friction. A free delay of the force stands for it.
+        Dry friction yields before it slips, as in a diagnosis, if the residual is a step lower for
+        it. Without it the force after each reversal is fitted as mass.
         """
         (number,) = CLOCK.free
         timed = {number.key, BY_NAME[LAG].free[0].key}
@@ -392,7 +401,26 @@ class _Fitter:
         beside = [CLOCK] if loader and timed.isdisjoint(keys_of(effects)) else []
         priors = {CLOCK.value_key(number): (0.0, number.high / NORMAL_95)}
         case = Case(self.rig, self.control, outputs)
-        return fit_set(case, effects, beside, priors, start or {}, part=part)
+        rigid = fit_set(case, effects, beside, priors, start or {}, part=part)
+        yielding = self._contact(effects) if loader else []
+        if not yielding:
+            return rigid
+        beside += yielding
+        begun = case.with_contact(effects, beside, {**rigid.values, **(start or {})})
+        soft = fit_set(case, effects, beside, priors, begun, part=part)
+        ours = touched(outputs, yielding)
+        left, without = (_held_out_rms(ours, one.rig) for one in (soft, rigid))
+        return soft if left < (1.0 - LESSER) * without else rigid
+
+    def _contact(self, effects: Sequence[Effect]) -> list[Effect]:
+        """Return the presliding parameters that are not free, if the fitted rig has friction."""
+        begun = {effect.value_key(p): p.starts[0] for effect in effects for p in effect.free}
+        rig = possible(self.rig, self.control, effects, begun)
+        if rig is None or not is_dry(rig, self.control):
+            return []
+        free = {p.key_on(self.control) for effect in effects for p in effect.free}
+        given = contact(self.rig, self.control)
+        return [one for one in given if one.free[0].key_on(self.control) not in free]
 
     def _number(self, effect: Effect, whole: Fit, each: Sequence[Fit]) -> Number:
         """Return a parameter with the wider of its interval and its scatter between records."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,7 @@ from coupled.rig.rigfile import read_rig
 from coupled.rig.rigwrite import rig_text
 from tests.support.commands import coupled
 from tests.support.gaps import made, nominal_rig
+from tests.support.machines import plain_rig, recorded
 from tests.support.rigs import bench
 
 FOUNDERS = Path(__file__).parents[3] / "shared" / "real"
@@ -97,6 +99,36 @@ def test_a_rest_does_not_count_as_sliding(rest_N: float) -> None:
     start = slide().changed({f"controls.column.loader.{key}": v for key, v in known.items()})
     fitted = fit_nominal(start, {"r": imposed_with_rests(rest_N)}, keys)
     assert found(fitted) == pytest.approx(dict(zip(keys, (5.0, DAMPING), strict=True)), rel=0.03)
+
+
+def sprung(seconds: float = 20.0, rate_Hz: float = 100.0, steps: int = 20) -> Record:
+    """Return a record of a mass on a spring whose friction yields by 0.1 mm (Dahl), by Euler."""
+    time = np.arange(round(seconds * rate_Hz * steps)) / (rate_Hz * steps)
+    waves = ((25.0, 0.23), (14.0, 0.61), (8.0, 1.7), (5.0, 3.1))
+    pull = np.sum([s * np.sin(2.0 * np.pi * at_Hz * time) for s, at_Hz in waves], axis=0)
+    place = speed = held = 0.0
+    read = np.empty((len(time) // steps, 2))
+    for k, force in enumerate(pull.tolist()):
+        if k % steps == 0:
+            read[k // steps] = force, place
+        speed += (force - DAMPING * speed - 1000.0 * place - held) / MASS_kg * time[1]
+        place += speed * time[1]
+        slips = math.copysign(FRICTION_N, speed)
+        held = slips + (held - slips) * math.exp(-abs(speed) * time[1] / 1e-4)
+    read += (0.05, 5e-6) * np.random.default_rng(7).standard_normal(read.shape)
+    return recorded(rate_Hz, force_N=read[:, 0], computed_m=read[:, 1])
+
+
+def test_friction_that_yields_before_it_slips_is_not_fitted_as_mass() -> None:
+    """Of four machines with such friction, the interval of the mass excluded the mass."""
+    rig = plain_rig(100.0, {"mass_kg": 6.0, "damping_N_s_per_m": 20.0}, 1000.0)
+    fitted = fit_nominal(rig, {"r": sprung()}, KEYS)
+    for number, real in zip(fitted.numbers, (MASS_kg, DAMPING, FRICTION_N), strict=True):
+        assert number.interval is not None
+        assert number.interval[0] < real < number.interval[1]
+        assert number.width < 0.05
+    assert fitted.channels[0].after < 1.1 * fitted.channels[0].floor
+    assert fitted.rig.controls["column"].loader.friction_stiffness == 0.0  # as in a diagnosis
 
 
 def test_a_number_that_the_records_do_not_determine_stays_as_filed(tmp_path: Path) -> None:
