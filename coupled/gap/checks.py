@@ -53,6 +53,7 @@ from coupled.record.channels import (
 from coupled.record.importing import plausible
 from coupled.record.importing.account import log_rate_of
 from coupled.record.importing.redundant import force_unit, other_units, rate_ratio, reversed_rates
+from coupled.record.importing.suggest.sizes import RATES_Hz
 from coupled.record.record import Record
 from coupled.record.samples import FINER, check_samples, sampling_rate_of
 from coupled.resources import aircraft_folder
@@ -249,19 +250,25 @@ def clipped(record: Record, control: ControlName, file: str) -> list[str]:
     ]
 
 
-def not_measured(record: Record, control: ControlName | None, file: str) -> list[str]:
+def not_measured(
+    record: Record, control: ControlName | None, file: str, set_points: bool = False
+) -> list[str]:
     """Return a sentence on each sensor of a control that repeats its readings.
 
-    One more tells that the import has interpolated the log's rows.
+    A force may be applied in steps, and δc if it is a set point; they are longer than those of the
+    slowest log. One more sentence tells that the import has interpolated the log's rows.
     """
     signals = {} if control is None else _signals(record, control)
+    rate_Hz = sampling_rate_of(record, file)
+    applied = ("force", "computed") if set_points else ("force",)
+    most = {} if control is None else {channel(control, q): rate_Hz / RATES_Hz[0] for q in applied}
     said = [
         f"{name} of {file} {repeats}: an effect may be the recorder's. Log it anew every frame."
         for name, signal in signals.items()
-        if (repeats := plausible.held(signal, in_steps="force" in name))
+        if (repeats := plausible.held(signal, most.get(name, math.inf)))
     ]
     log_Hz = log_rate_of(record)
-    if log_Hz is not None and log_Hz < (1.0 - SMALL) * sampling_rate_of(record, file):
+    if log_Hz is not None and log_Hz < (1.0 - SMALL) * rate_Hz:
         said.append(
             f"{file} is interpolated between the {log_Hz:.4g} rows a second of its log: its noise "
             "is unknown, and a gap may be the interpolation's. Log every frame."

@@ -136,7 +136,10 @@ def prepare(
     check_against_model(outputs, rig, list(records), each)
     check_labels(outputs, rig, records)
     own = control if part.own else None
-    repeated = [words for file, one in records.items() for words in not_measured(one, own, file)]
+    set_points = judged.readers[0].set_points
+    repeated = [
+        words for file, one in records.items() for words in not_measured(one, own, file, set_points)
+    ]
     left_out = [*(why for one in live for why in one.left_out), *repeated]
     for file, record in records.items() if part.own else ():
         left_out += clipped(record, control, file)

@@ -74,11 +74,18 @@ def test_a_sensor_that_renews_its_value_more_rarely_than_the_rows_is_named(rows:
     assert f"column_deflection_m of r.csv holds each value over {rows}" in said
 
 
-def test_a_force_that_a_bench_applies_in_steps_is_measured() -> None:
-    """A stair of force, held for a second each, had halved the probability of any effect."""
+@pytest.mark.parametrize(
+    ("column", "rows", "set_points", "count"),
+    [(1, 50, False, 0), (1, 6, False, 1), (2, 50, False, 1), (2, 50, True, 0), (2, 6, True, 1)],
+)
+def test_what_a_bench_applies_in_long_steps_is_measured(
+    column: int, rows: int, set_points: bool, count: int
+) -> None:
+    """A stair of force, held for half a second each, had halved the probability of any effect."""
     data = moved(1.0).data.copy()
-    data[:, 1] = data[np.arange(len(data)) // 50 * 50, 1]
-    assert not_measured(Record(NAMES, data), "column", "r.csv") == []
+    data[:, column] = data[np.arange(len(data)) // rows * rows, column]
+    said = not_measured(Record(NAMES, data), "column", "r.csv", set_points)
+    assert len(said) == count
 
 
 def test_an_effect_beside_a_sensor_that_holds_its_value_is_as_probably_the_recorders(

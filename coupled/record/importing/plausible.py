@@ -109,14 +109,13 @@ def held_extreme(values: Floats) -> float | None:
     return None
 
 
-def held(values: Floats, in_steps: bool = False) -> str:
+def held(values: Floats, most_rows: float = math.inf) -> str:
     """Return how a sensor repeats its value where it should have moved, or nothing.
 
-    It may renew its value every few rows, by steps far above its resolution; not if the quantity
-    itself may go `in_steps`, as a force, unlike the motion of a mass. Or it stands still in
-    noise that is far above its resolution, and jumps before or after: a sensor at rest does not.
-    Noise is seen if its differences of fourth and sixth order agree. The largest and least values
-    are not judged (`clipped_at`).
+    It may renew its value every few rows, at most `most_rows`, by steps far above its resolution.
+    Or it stands still in noise that is far above its resolution, and jumps before or after: a
+    sensor at rest does not. Noise is seen if its differences of fourth and sixth order agree. The
+    largest and least values are not judged (`clipped_at`).
     """
     change, levels = np.diff(values), np.unique(values)
     if levels.size < 3:
@@ -127,12 +126,8 @@ def held(values: Floats, in_steps: bool = False) -> str:
     spacing = np.diff(moved)
     every = float(np.median(spacing))
     regular = float(np.mean(np.abs(spacing - every) <= 1.0)) > REGULAR
-    if (
-        not in_steps
-        and every >= 2.0
-        and regular
-        and float(np.median(np.abs(change[moved]))) > coarse
-    ):
+    steps = regular and float(np.median(np.abs(change[moved]))) > coarse
+    if steps and 2.0 <= every <= most_rows:
         return f"holds each value over {every:g} rows"
     noise = noise_level(values)
     if noise <= max(coarse, ROUNDING * float(np.ptp(values))):
