@@ -29,6 +29,20 @@ def test_a_contact_is_found_between_hollows(length: float, share: float) -> None
     assert left(*found) < 1.05
 
 
+@pytest.mark.parametrize("share", [0.15, 0.45])
+def test_a_contact_is_found_along_a_valley(share: float) -> None:
+    """A healthy column of 15 N of friction was unexplained: its start stuck across the valley."""
+
+    def left(tried: float, part: float) -> float:
+        far, off = math.log(tried / 4.5e-4), part - share
+        return 1.0 + 50.0 * (far - 1.2 * off) ** 2 + off**2
+
+    assert contact_start(left, 5e-4, 0.95) == (
+        pytest.approx(4.5e-4, rel=0.02),
+        pytest.approx(share, abs=0.02),
+    )
+
+
 def test_a_contact_stays_within_its_bounds() -> None:
     assert contact_start(lambda length, share: -length - share, 5e-4, 0.95) == (5e-4, 0.95)
     assert contact_start(lambda length, share: length + share, 5e-4, 0.95) == (5e-7, 0.0)

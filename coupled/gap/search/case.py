@@ -48,7 +48,9 @@ def contact_start(cost: Cost, most: float, most_elastic: float) -> tuple[float, 
         length, share = best
         longer = ((length * times, share), (length / times, share))
         softer = ((length, share + more), (length, share - more))
-        near = min((within(*step) for step in (*longer, *softer)), key=cost_at)
+        # A longer contact of a larger share sticks much alike: the valley of cost is diagonal.
+        along = ((length * times, share + more), (length / times, share - more))
+        near = min((within(*step) for step in (*longer, *softer, *along)), key=cost_at)
         if cost_at(near) < cost_at(best):
             best = near
         else:
