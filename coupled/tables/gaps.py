@@ -104,7 +104,7 @@ def _shrink(one: ChannelShrink, system: System) -> Row:
     label, unit = _channel(one.channel, system)
     numbers = (f"{unit.factor * n:.3g}" for n in (one.before, one.after, one.floor))
     if one.closed is None or one.low is None or one.high is None:
-        return label, *numbers, NONE, NONE
+        return label, *numbers, NONE if one.closed is None else percent(one.closed, 0), NONE
     few = "" if one.reliable else f", of {one.blocks} stretches"
     ends = f"{100 * one.low:.0f} to {100 * one.high:.0f} %{few}"
     return label, *numbers, percent(one.closed, 0), ends

@@ -8,16 +8,25 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from coupled.gap import diagnose as diagnosing
 from coupled.gap.effects.effect import apply
 from coupled.gap.effects.library import BY_NAME, EFFECTS
-from coupled.gap.findings.budget import NOISE, UNEXPLAINED, _shares, shapley_weights
+from coupled.gap.findings.budget import (
+    NOISE,
+    UNEXPLAINED,
+    _shares,
+    channel_shrink,
+    shapley_weights,
+)
 from coupled.gap.findings.credibility import Credibility, Regime, _size
 from coupled.gap.findings.diagnosis import Diagnosis
 from coupled.gap.findings.flown import ChannelAgain, nearer
+from coupled.gap.signals.output import Output
 from coupled.gap.thresholds import STATED_MOST
 from coupled.rig.replay import replay_linkage
+from coupled.rig.rig import Rig
 from tests.support.gaps import know_only, made, nominal_rig
 
 DRIVES = ("column_computed_m", "column_force_N")
@@ -126,6 +135,25 @@ def test_a_cause_is_as_large_everywhere_and_what_to_set_is_said(tmp_path: Path) 
     assert (number.key, number.unit) == ("loader.bend_m_per_N", "m/N")
     assert "Bend, 9.14e-5 → " in found.summary
     assert "Set K̂ to 1.6" in found.summary
+
+
+@pytest.mark.parametrize("stretches", [1, 16])
+def test_a_share_of_stretches_that_may_hold_no_gap_has_no_interval(stretches: int) -> None:
+    """It was "-6148402756 to 56 %": of some of the stretches drawn the gap was about 0."""
+    rig = nominal_rig(False)
+    frames = np.arange(16 * 240)
+    size = np.where(frames // 240 < stretches, 30.0, 0.5)
+    wrong = size * np.random.default_rng(1).standard_normal(len(frames))
+
+    def predict(asked: Rig) -> NDArray[np.float64]:
+        return wrong * (0.4 if asked is rig else 0.1)
+
+    held = np.ones(len(frames), dtype=bool)
+    one = Output("loader", "x_m", 0.0 * wrong, predict, 0.5, 120.0, held=held)
+    other = rig.changed({"controls.column.loader.mass_kg": 5.0})
+    found = channel_shrink(one, rig, other, 1.0, improved=True)
+    assert found.closed is not None
+    assert (found.low is None) == (found.high is None) == (stretches == 1)
 
 
 def test_no_gap_has_no_budget(tmp_path: Path) -> None:

@@ -199,7 +199,8 @@ class ChannelShrink(Plain):
     """One channel's RMS residual on held-out stretches, in its own unit, and its noise floor.
 
     `closed` is (before − after)/(before − floor) with its 95 % interval; None if no effect was
-    found or there was no gap. `reliable`: computed from at least `FEW_STRETCHES` stretches.
+    found or there was no gap. There is no interval if stretches drawn anew may have no gap.
+    `reliable`: computed from at least `FEW_STRETCHES` stretches.
     """
 
     channel: str
@@ -271,15 +272,14 @@ def channel_shrink(
         return result
     picks = np.random.default_rng(7).integers(0, len(sums), (BOOTSTRAPS, len(sums)))
     drawn = np.array([_rms(sums[pick]) for pick in picks])
-    closed = (drawn[:, 0] - drawn[:, 1]) / np.maximum(drawn[:, 0] - floor, 1e-9)
-    low, high = np.percentile(np.minimum(closed, 1.0), [2.5, 97.5]).tolist()
-    return replace(
-        result,
-        closed=min(1.0, float((before - after) / (before - floor))),
-        low=low,
-        high=high,
-        reliable=len(sums) >= FEW_STRETCHES,
-    )
+    gaps = drawn[:, 0] - floor
+    closed = min(1.0, float((before - after) / (before - floor)))
+    result = replace(result, closed=closed, reliable=len(sums) >= FEW_STRETCHES)
+    if np.percentile(gaps, 2.5) <= 0.0:
+        return result
+    shares = np.minimum((drawn[:, 0] - drawn[:, 1]) / np.maximum(gaps, 1e-9), 1.0)
+    low, high = np.percentile(shares, [2.5, 97.5]).tolist()
+    return replace(result, low=low, high=high)
 
 
 def _rms(sums: NDArray[np.float64]) -> NDArray[np.float64]:

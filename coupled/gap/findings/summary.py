@@ -240,7 +240,7 @@ def _since(found: Findings) -> str:
         if stage.where.line is not None:
             said.append(_line(stage.where.channel, stage.where.line))
         if stage.remains is not None:
-            said.append(_remains(stage.name, stage.remains))
+            said.append(_remains(stage.name, stage.remains, bool(found.effects)))
     return " ".join(said)
 
 
@@ -288,12 +288,14 @@ def _line(channel: str, line: SeenLine) -> str:
     return f"A spectral line of {size} is at {line.seen_Hz:.4g} Hz in {channel}{tone}."
 
 
-def _remains(stage: str, left: Remains) -> str:
-    """Return a description of the residual that remains with the effects found."""
-    said = f"The residual of the {stage} with these effects is {left.gap:.3g} floors: "
+def _remains(stage: str, left: Remains, effects: bool) -> str:
+    """Return a description of the residual that remains, with the effects found if any."""
+    beside = " with these effects" if effects else ""
+    said = f"The residual of the {stage}{beside} is {left.gap:.3g} floors: "
     if left.follows:
         most = left.follows[0]
-        said += f"{100 * most.share:.0f} % correlates with {_signal(most.signal)}, and "
+        follows = "is" if most.signal == "constant" else "correlates with"
+        said += f"{100 * most.share:.0f} % {follows} {_signal(most.signal)}, and "
     share = round(100 * left.free_share)
     if share < 100.0 * MINOR:
         return f"{said}no function of the stage's signals predicts held-out stretches."
@@ -303,7 +305,7 @@ def _remains(stage: str, left: Remains) -> str:
 
 def _signal(name: str) -> str:
     if name == "constant":
-        return "no signal: it is constant"
+        return "its mean"
     base = next((known for known in OF_SIGNAL if name.startswith(known)), name)
     rest = name[len(base) :]
     kind = "the sign of " if rest.endswith("sign") else ""
@@ -332,13 +334,13 @@ def _sure(found: Findings) -> str:
 def closes(shrink: Shrink) -> str:
     """Return the share of the widest gap closed on held-out data, with its interval."""
     most = shrink.widest
-    if most.closed is None or most.low is None or most.high is None:
+    if most.closed is None:
         return ""
     few = "" if most.reliable else ", from too few stretches to rely on"
-    low, high = round(100 * most.low), round(100 * most.high)
-    ends = f"{low} to {high} %{few}"
-    if few and (most.low <= 0.0 or low == high):  # stretches without a gap, or only one
-        ends = "from too few stretches for an interval"
+    ends = "from too few stretches for an interval"  # or of them some without a gap
+    if most.low is not None and most.high is not None:
+        low, high = round(100 * most.low), round(100 * most.high)
+        ends = ends if few and low == high else f"{low} to {high} %{few}"
     return f"It closes {100 * most.closed:.0f} % of the gap on held-out data ({ends})."
 
 
