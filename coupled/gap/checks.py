@@ -23,10 +23,10 @@ import numpy as np
 from coupled.errors import InputError, nearest
 from coupled.flight.aircraft import make_aircraft
 from coupled.flight.altered import STILL
-from coupled.gap.signals.output import Floats, Output
+from coupled.gap.signals.output import Floats, Output, estimate_noise
 from coupled.gap.signals.reading import PRESSURE
 from coupled.gap.stages.openloop import throttles_of
-from coupled.gap.stages.surfaces import surface_channel, surface_points
+from coupled.gap.stages.surfaces import start_of, surface_channel, surface_points
 from coupled.gap.thresholds import (
     DOUBLED,
     FAR_SIGMAS,
@@ -38,6 +38,8 @@ from coupled.gap.thresholds import (
     SHORT_SWINGS,
     SMALL,
     TINY,
+    TRIM_SIGMAS,
+    BRIEF_s,
     OTHER_ALTITUDE_m,
     SHORTEST_RECORD_s,
 )
@@ -315,16 +317,11 @@ def check_trim(trim_speed_m_per_s: float, record: Record, file: object) -> None:
     """Raise InputError if a record does not start at the trim speed of the rig's aircraft."""
     if SPEED not in record:
         return
-    start = start_of(record, SPEED)
+    start = float(np.median(record[SPEED][:SHORT_FRAMES]))
     if abs(start / trim_speed_m_per_s - 1.0) > OTHER_SPEED:
         problem = f"starts at {start:.4g}, and the aircraft is trimmed at {trim_speed_m_per_s:.4g}"
         remedy = "give records from their trim on, and those of another trim by themselves"
         raise InputError(file, SPEED, f"{problem}: {remedy}")
-
-
-def start_of(record: Record, name: str) -> float:
-    """Return the value of a channel at the start of a record, in its unit."""
-    return float(np.median(record[name][:SHORT_FRAMES]))
 
 
 ALTITUDE, CALIBRATED, PATH = "altitude_m", "calibrated_airspeed_m_per_s", "flight_path_rad"
@@ -412,21 +409,36 @@ def _manifest_trim(flight: Flight, record: Record, file: str) -> dict[str, Any] 
 
 
 def _measured_trim(rig: Rig, record: Record, file: str) -> dict[str, Any]:
-    """Return the measured trim at a record's start; empty if it is the rig's or not measured."""
+    """Return the measured trim at a record's start; empty if it is the rig's or not measured.
+
+    A value within its error of the rig's is the rig's.
+    """
     assert rig.flight is not None
-    if SPEED not in record:
+    names = (SPEED, ALTITUDE, "pitch_rad", "alpha_rad")
+    known = {name: record[name] for name in names if name in record}
+    if SPEED not in known or not all(np.isfinite(values).all() for values in known.values()):
         return {}
     flight, found = rig.flight, dict[str, Any]()
-    wanted = start_of(record, SPEED)
-    if ALTITUDE in record:
-        found[ALTITUDE] = start_of(record, ALTITUDE)
-    elsewhere = abs(found.get(ALTITUDE, flight.altitude) - flight.altitude) > OTHER_ALTITUDE_m
-    if abs(wanted / trim_speed(rig) - 1.0) <= OTHER_SPEED and not elsewhere:
+    rows = max(2, round(BRIEF_s * rig.frame_rate))
+
+    def off(values: Floats, filed: float, least: float = 0.0) -> float | None:
+        noise = estimate_noise(values)
+        start, error = start_of(values[:rows], noise.rms * math.sqrt(noise.mean_variance))
+        return start if abs(start - filed) > max(TRIM_SIGMAS * error, least) else None
+
+    if ALTITUDE in known:
+        height = off(known[ALTITUDE], flight.altitude, OTHER_ALTITUDE_m)
+        found |= {} if height is None else {ALTITUDE: height}
+    here = rig.changed({f"flight.{key}": value for key, value in found.items()})
+    wanted = off(known[SPEED], trim_speed(here))
+    if wanted is None and not found:
         return {}
-    if "pitch_rad" in record and "alpha_rad" in record:
-        path = start_of(record, "pitch_rad") - start_of(record, "alpha_rad")
-        if abs(path - flight.flight_path) > NEGLIGIBLE:
-            found[PATH] = path
+    if "pitch_rad" in known and "alpha_rad" in known:
+        path = known["pitch_rad"] - known["alpha_rad"]
+        angle = off(path, flight.flight_path, NEGLIGIBLE)
+        found |= {} if angle is None else {PATH: angle}
+    if wanted is None:
+        return found
 
     def true_speed(calibrated: float) -> float:
         found[CALIBRATED] = calibrated

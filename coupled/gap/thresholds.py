@@ -196,7 +196,7 @@ PRIOR_SPAN = 9.2  # prior: ln 10⁴; over four decades a size is equally likely 
 VERY_STRONG = 5.0  # error rate: log evidence, 2 ln B > 10 (Kass and Raftery 1995)
 
 # Short records, and the airframe (`checks`, `airframe`, `trim`).
-OTHER_ALTITUDE_m = 100.0  # tolerance: of the trim's altitude; 1 % of the air's density
+OTHER_ALTITUDE_m = 3.0  # tolerance: of the trim's altitude; 0.03 % of the air's density
 SHORT_SWINGS = 4  # error rate: of a short record: both halves hold motion in both directions
 SHOT_TRIES = 3  # step: samples of the error of restarts, of which each segment has one; chosen
 

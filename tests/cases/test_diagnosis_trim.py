@@ -13,6 +13,8 @@ from coupled.errors import InputError
 from coupled.flight.runfile import read_run
 from coupled.record.record import Record, manifest_path, write_record
 from coupled.rig.rig import Rig
+from tests.support import threecontrols
+from tests.support.airframes import noisy
 from tests.support.commands import coupled
 
 CAS = "flight.calibrated_airspeed_m_per_s"
@@ -56,6 +58,25 @@ def test_the_trim_is_taken_from_the_first_rows_without_a_manifest(
     assert found.trim.startswith("Trim taken from the first rows of record,")
     assert found.nominal.flight is not None
     assert found.nominal.flight.calibrated_airspeed == pytest.approx(102.9, rel=1e-3)
+
+
+@pytest.mark.parametrize(("faster", "higher_m"), [(1.01, 0.0), (1.0, 60.0), (1.0, 0.0)])
+def test_a_healthy_flight_at_nearly_the_filed_trim_has_no_gap(
+    faster: float, higher_m: float
+) -> None:
+    """One per cent of speed left 16 noise floors, since up to 3 % counted as the filed trim."""
+    rig = noisy(api.load_rig("c172p"))
+    assert rig.flight is not None
+    speed, height = rig.flight.calibrated_airspeed * faster, rig.flight.altitude + higher_m
+    trim = {CAS: speed, "flight.altitude_m": height}
+    record = bare(threecontrols.flown(rig, trim, 16.0))
+    found = api.diagnose(rig, record)
+    assert found.verdict == "no_gap", found.summary
+    taken = found.nominal.flight
+    assert taken is not None
+    assert taken.calibrated_airspeed == pytest.approx(speed, rel=1e-3)
+    assert taken.altitude == pytest.approx(height, abs=0.5)
+    assert (taken == rig.flight) is (faster == 1.0 and not higher_m)
 
 
 def test_a_trim_that_is_the_rig_files_own_is_not_talked_of(filed: Rig) -> None:

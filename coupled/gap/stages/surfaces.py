@@ -285,7 +285,7 @@ def trim_of(rig: Rig, record: Record, control: ControlName) -> Trim | None:
     own, noise, first = own_trim(rig, control), white(record[name]), float(record[name][0])
     off = _standing_off(rig, record, control, own)
     if off is None:  # by the rows before it moves
-        start, error = _start_of(record[name][: max(2, round(BRIEF_s * rig.frame_rate))], noise)
+        start, error = start_of(record[name][: max(2, round(BRIEF_s * rig.frame_rate))], noise)
         at = own if abs(start - own) <= TRIM_SIGMAS * error else start
         return Trim(at, start, error)
     standing, error = off
@@ -306,8 +306,8 @@ def trim_of(rig: Rig, record: Record, control: ControlName) -> Trim | None:
     return Trim(there, there, error) if in_trim else Trim(own, own, noise, standing)
 
 
-def _start_of(position: Floats, noise: float) -> tuple[float, float]:
-    """Return a surface's position in the first row, rad, and its standard error.
+def start_of(position: Floats, noise: float) -> tuple[float, float]:
+    """Return a channel's value in the first row, as a surface's position, and its standard error.
 
     From the rows before it moves by more than noise: their mean, or the start of a parabola if that
     improves the fit.
