@@ -30,6 +30,7 @@ from coupled.gap.stages.surfaces import start_of, surface_channel, surface_point
 from coupled.gap.thresholds import (
     DOUBLED,
     FAR_SIGMAS,
+    MOST,
     NEGLIGIBLE,
     OTHER_SPEED,
     PIECE,
@@ -317,7 +318,7 @@ def check_trim(trim_speed_m_per_s: float, record: Record, file: object) -> None:
     """Raise InputError if a record does not start at the trim speed of the rig's aircraft."""
     if SPEED not in record:
         return
-    start = float(np.median(record[SPEED][:SHORT_FRAMES]))
+    start = float(np.median(record[SPEED][_FIRST]))
     if abs(start / trim_speed_m_per_s - 1.0) > OTHER_SPEED:
         problem = f"starts at {start:.4g}, and the aircraft is trimmed at {trim_speed_m_per_s:.4g}"
         remedy = "give records from their trim on, and those of another trim by themselves"
@@ -328,6 +329,7 @@ ALTITUDE, CALIBRATED, PATH = "altitude_m", "calibrated_airspeed_m_per_s", "fligh
 # The keys of a rig's `flight` that define the initial trim, not the aircraft.
 TRIM_KEYS = (ALTITUDE, CALIBRATED, PATH, "trim", "landing", "properties")
 _FIELDS = file_keys(Flight, "m")
+_FIRST, _LAST = slice(SHORT_FRAMES), slice(-SHORT_FRAMES, None)
 
 
 def rig_of_manifests(records: Mapping[str, Record]) -> Rig:
@@ -431,12 +433,10 @@ def _measured_trim(rig: Rig, record: Record, file: str) -> dict[str, Any]:
         found |= {} if height is None else {ALTITUDE: height}
     here = rig.changed({f"flight.{key}": value for key, value in found.items()})
     wanted = off(known[SPEED], trim_speed(here))
-    if wanted is None and not found:
-        return {}
     if "pitch_rad" in known and "alpha_rad" in known:
-        path = known["pitch_rad"] - known["alpha_rad"]
-        angle = off(path, flight.flight_path, NEGLIGIBLE)
-        found |= {} if angle is None else {PATH: angle}
+        angle = off(known["pitch_rad"] - known["alpha_rad"], flight.flight_path)
+        if angle is not None and _climbs(record, angle - flight.flight_path):
+            found[PATH] = angle
     if wanted is None:
         return found
 
@@ -454,6 +454,26 @@ def _measured_trim(rig: Rig, record: Record, file: str) -> dict[str, Any]:
         filed = f"the rig file has it at {trim_speed(rig):.4g}: another rig's file?"
         raise InputError(file, SPEED, f"{problem} {filed}") from None
     return found
+
+
+def _climbs(record: Record, angle: float) -> bool:
+    """Tell whether the altitude changes as by a path that is off by an angle, rad.
+
+    It does not by an offset of the vane or of the attitude. True if the altitude is not recorded.
+    """
+    if ALTITUDE not in record:
+        return True
+    names = ("roll_rad", "sideslip_rad", "pitch_rad", "alpha_rad")
+    level = np.zeros(len(record))
+    roll, beta, pitch, alpha = (
+        record[name] if name in record.channels else level for name in names
+    )
+    forward, down = np.cos(alpha) * np.cos(beta), np.sin(alpha) * np.cos(beta) * np.cos(roll)
+    up = forward * np.sin(pitch) - (np.sin(beta) * np.sin(roll) + down) * np.cos(pitch)
+    lengths = record[SPEED][:-1] * np.diff(record.time_s)  # of the path, by frames
+    first, last = (np.median(record[ALTITUDE][rows]) for rows in (_FIRST, _LAST))
+    missed = (last - first - float(np.sum(up[:-1] * lengths))) / float(np.sum(lengths))
+    return bool(abs(missed) < MOST * abs(angle))
 
 
 def unmeasured_trim(rig: Rig, records: Mapping[str, Record]) -> str:

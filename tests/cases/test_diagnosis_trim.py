@@ -11,6 +11,7 @@ import pytest
 import coupled as api
 from coupled.errors import InputError
 from coupled.flight.runfile import read_run
+from coupled.gap.checks import trimmed
 from coupled.record.record import Record, manifest_path, write_record
 from coupled.rig.rig import Rig
 from tests.support import threecontrols
@@ -60,15 +61,18 @@ def test_the_trim_is_taken_from_the_first_rows_without_a_manifest(
     assert found.nominal.flight.calibrated_airspeed == pytest.approx(102.9, rel=1e-3)
 
 
-@pytest.mark.parametrize(("faster", "higher_m"), [(1.01, 0.0), (1.0, 60.0), (1.0, 0.0)])
+@pytest.mark.parametrize(
+    ("faster", "higher_m", "climb"),
+    [(1.01, 0.0, 0.0), (1.0, 60.0, 0.0), (1.0, 0.0, 0.003), (1.0, 0.0, 0.0)],
+)
 def test_a_healthy_flight_at_nearly_the_filed_trim_has_no_gap(
-    faster: float, higher_m: float
+    faster: float, higher_m: float, climb: float
 ) -> None:
     """One per cent of speed left 16 noise floors, since up to 3 % counted as the filed trim."""
     rig = noisy(api.load_rig("c172p"))
     assert rig.flight is not None
     speed, height = rig.flight.calibrated_airspeed * faster, rig.flight.altitude + higher_m
-    trim = {CAS: speed, "flight.altitude_m": height}
+    trim = {CAS: speed, "flight.altitude_m": height, "flight.flight_path_rad": climb}
     record = bare(threecontrols.flown(rig, trim, 16.0))
     found = api.diagnose(rig, record)
     assert found.verdict == "no_gap", found.summary
@@ -76,7 +80,17 @@ def test_a_healthy_flight_at_nearly_the_filed_trim_has_no_gap(
     assert taken is not None
     assert taken.calibrated_airspeed == pytest.approx(speed, rel=1e-3)
     assert taken.altitude == pytest.approx(height, abs=0.5)
-    assert (taken == rig.flight) is (faster == 1.0 and not higher_m)
+    assert taken.flight_path == pytest.approx(climb, abs=3e-4)
+    assert (taken == rig.flight) is (faster == 1.0 and not higher_m and not climb)
+
+
+@pytest.mark.parametrize("name", ["alpha_rad", "pitch_rad"])
+def test_an_offset_of_vane_or_attitude_is_no_path(name: str) -> None:
+    rig = noisy(api.load_rig("c172p"))
+    record = threecontrols.flown(rig, {}, 16.0)
+    data = record.data.copy()
+    data[:, record.channels.index(name)] += 0.01
+    assert trimmed(rig, {"r": Record(record.channels, data)}) == (rig, "")
 
 
 def test_a_trim_that_is_the_rig_files_own_is_not_talked_of(filed: Rig) -> None:
