@@ -508,20 +508,28 @@ def not_in_trim(record: Record, file: str) -> str:
     return ""
 
 
-def other_air(rig: Rig, record: Record, file: str) -> str:
-    """Return a sentence on air whose density is not the model's at the record's altitude.
+def density_of(rig: Rig, record: Record) -> float:
+    """Return the density of a record's air over the model's at that altitude; 1 if not measured.
 
-    The aircraft's forces in such air are those of another mass with other inertias.
+    It is 1 up to `NEGLIGIBLE`. The aircraft's forces in other air are those of another mass with
+    other inertias.
     """
     names = (PRESSURE, SPEED, ALTITUDE)
     if any(name not in record for name in names):
-        return ""
+        return 1.0
     measured = plausible.pressure_ratio(*(record[name] for name in names))
     own = plausible.pressure_ratio(*(np.array([_in_trim(rig, name)]) for name in names))
     if measured is None or own is None or abs(measured / own - 1.0) <= NEGLIGIBLE:
+        return 1.0
+    return measured / own
+
+
+def other_air(density: float, file: str) -> str:
+    """Return a sentence on air of another density than the model's; empty if it is that."""
+    if density == 1.0:
         return ""
     return (
-        f"By q̄ and airspeed of {file} the density of the air is {measured / own:.3f} times the "
+        f"By q̄ and airspeed of {file} the density of the air is {density:.3f} times the "
         "model's, which acts as a factor on mass and inertias: check altitude (above sea level), "
         'airspeed (true) and temperature ("atmosphere/delta-T" in flight.properties, °R).'
     )

@@ -27,6 +27,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from coupled.errors import InputError
+from coupled.flight.loading import INERTIAS
 from coupled.gap.chain import AIRFRAME, Part
 from coupled.gap.checks import (
     at_rate_of,
@@ -36,6 +37,7 @@ from coupled.gap.checks import (
     check_trim,
     check_units,
     clipped,
+    density_of,
     motion_alone,
     not_in_trim,
     not_measured,
@@ -46,6 +48,7 @@ from coupled.gap.checks import (
 from coupled.gap.effects.effect import Effect, keys_of
 from coupled.gap.effects.library import library_of
 from coupled.gap.findings.healthy import Baseline
+from coupled.gap.findings.result import EffectResult
 from coupled.gap.search.case import Case, Tell, allowing_for_contact
 from coupled.gap.signals.live import judged_part, live_of
 from coupled.gap.signals.output import Floats, Output, estimate_noise, rounding
@@ -74,7 +77,8 @@ class Prepared:
     `case` holds the rig and the outputs, `library` the effects that can be tried. `trim` and
     `left_out` are sentences for the report: the trim that was taken from the records, and what of
     the records is not judged. `baseline` is the healthy machine, if it is known. `by_recorder`:
-    rows that no sensor has measured may be the cause of what is found.
+    rows that no sensor has measured may be the cause of what is found. `density` is that of the
+    air over the model's.
     """
 
     part: Part
@@ -86,6 +90,15 @@ class Prepared:
     left_out: tuple[str, ...] = ()
     baseline: Baseline | None = None
     by_recorder: bool = False
+    density: float = 1.0
+
+    def is_otherwise(self, effect: EffectResult) -> bool:
+        """Tell whether the recorder or the air is as probable a cause as an effect."""
+        if self.by_recorder or self.density == 1.0 or effect.name not in ("mass", *INERTIAS):
+            return self.by_recorder
+        (p,) = effect.parameters
+        ends = (-math.inf if p.low is None else p.low, math.inf if p.high is None else p.high)
+        return ends[0] <= 1.0 / self.density <= ends[1]
 
 
 def prepare(
@@ -143,9 +156,11 @@ def prepare(
     left_out = [*(why for one in live for why in one.left_out), *repeated]
     for file, record in records.items() if part.own else ():
         left_out += clipped(record, control, file)
+    densities = dict[str, float]()
     if any(output.stage == AIRFRAME for output in outputs):
         left_out += [not_judged(each), *(not_in_trim(one, file) for file, one in records.items())]
-        left_out += [other_air(rig, one, file) for file, one in records.items()]
+        densities = {file: density_of(rig, one) for file, one in records.items()}
+        left_out += [other_air(density, file) for file, density in densities.items()]
     library = [one for one in library_of(rig, control) if part.frees(keys_of([one]))]
     if terms and part.airframe:
         library = with_terms(library, rig, records)
@@ -159,6 +174,7 @@ def prepare(
         tuple(dict.fromkeys(words for words in left_out if words)),
         baseline,
         bool(repeated) and baseline is None,
+        next((density for density in densities.values() if density != 1.0), 1.0),
     )
 
 

@@ -153,3 +153,16 @@ def test_an_improved_rig_keeps_the_rig_files_trim(tmp_path: Path) -> None:
     improved = api.load_rig(tmp_path / "new.toml")
     assert improved.flight == api.load_rig("737").flight
     assert improved.controls["column"].loader.bend == pytest.approx(6e-4, rel=0.03)
+
+
+def test_on_a_hot_day_the_air_is_as_probable_as_a_mass() -> None:
+    """Mass and inertias had 0.89 each, and were to be set."""
+    rig = noisy(api.load_rig("c172p"))
+    hot = rig.changed({"flight.properties": {"atmosphere/delta-T": 36.0}})
+    found = api.diagnose(rig, bare(threecontrols.flown(hot, {"flight.roll_damping": 0.7}, 16.0)))
+    assert found.verdict == "ambiguous"
+    by = {effect.name: effect.probability for effect in found.effects}
+    assert by.pop("roll_damping") > 0.8
+    assert "mass" in by
+    assert max(by.values()) < 0.5
+    assert "the density of the air is 0.94" in found.summary

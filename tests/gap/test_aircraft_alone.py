@@ -14,6 +14,7 @@ from coupled.errors import InputError
 from coupled.gap.chain import Part
 from coupled.gap.checks import (
     at_rate_of,
+    density_of,
     motion_alone,
     not_in_trim,
     other_air,
@@ -182,12 +183,14 @@ def test_air_of_another_density_is_named(healthy: Record) -> None:
     rig, _ = trimmed(at_rate_of(alone(), {"log": healthy}), {"log": healthy})
     standard = 1.0902 * 0.5 * healthy["true_airspeed_m_per_s"] ** 2  # at 1200 m
 
-    def words(density: float) -> str:
+    def measured(density: float) -> float:
         data = np.column_stack([healthy.data, density * standard])
-        return other_air(rig, Record((*healthy.channels, "dynamic_pressure_Pa"), data), "log")
+        return density_of(rig, Record((*healthy.channels, "dynamic_pressure_Pa"), data))
 
-    assert words(1.0) == other_air(rig, healthy, "log") == ""
-    assert "the density of the air is 0.940 times the model's" in words(0.94)
+    assert measured(1.0) == density_of(rig, healthy) == 1.0
+    assert measured(0.94) == pytest.approx(0.94, rel=1e-3)
+    assert other_air(1.0, "log") == ""
+    assert "the density of the air is 0.940 times the model's" in other_air(0.94, "log")
 
 
 def test_a_fault_of_the_forces_is_not_judged_by_an_aircraft_alone(healthy: Record) -> None:
