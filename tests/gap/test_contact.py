@@ -37,10 +37,9 @@ def test_a_contact_is_found_along_a_valley(share: float) -> None:
         far, off = math.log(tried / 4.5e-4), part - share
         return 1.0 + 50.0 * (far - 1.2 * off) ** 2 + off**2
 
-    assert contact_start(left, 5e-4, 0.95) == (
-        pytest.approx(4.5e-4, rel=0.02),
-        pytest.approx(share, abs=0.02),
-    )
+    found = contact_start(left, 5e-4, 0.95)
+    assert found[0] == pytest.approx(4.5e-4, rel=0.02)
+    assert found[1] == pytest.approx(share, abs=0.02)
 
 
 def test_a_contact_stays_within_its_bounds() -> None:
