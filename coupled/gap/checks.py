@@ -266,7 +266,7 @@ def not_measured(
     applied = ("force", "computed") if set_points else ("force",)
     most = {} if control is None else {channel(control, q): rate_Hz / RATES_Hz[0] for q in applied}
     said = [
-        f"{name} of {file} {repeats}: an effect may be the recorder's. Log it anew every frame."
+        f"{name} of {file} {repeats}: an effect may be the recorder's. Log new readings only."
         for name, signal in signals.items()
         if (repeats := plausible.held(signal, most.get(name, math.inf)))
     ]
@@ -457,9 +457,10 @@ def _measured_trim(rig: Rig, record: Record, file: str) -> dict[str, Any]:
 
 
 def _climbs(record: Record, angle: float) -> bool:
-    """Tell whether the altitude changes as by a path that is off by an angle, rad.
+    """Tell whether the altitude confirms that the flight path is off by an angle, rad.
 
-    It does not by an offset of the vane or of the attitude. True if the altitude is not recorded.
+    An offset of the vane or of the attitude changes the angle, but not the altitude. True if the
+    altitude is not recorded.
     """
     if ALTITUDE not in record:
         return True
