@@ -230,11 +230,6 @@ def findings(prepared: Prepared, case: Case, choice: Choice) -> PartDiagnosis:
     judge = Judge(readers, outputs, choice, case.gaps(fit.rig))
     stages = _of_part(part, judge.stages())
     effects = effects_of(case, choice, readers, stages)
-    other = {one.name for one in effects if prepared.is_otherwise(one)}
-    effects = tuple(
-        replace(one, probability=MOST * one.probability) if one.name in other else one
-        for one in effects
-    )
     if unsure := incredible(choice, effects):
         stages = _of_part(part, replace(judge, doubted=unsure).stages())
     fitted = Problem(case).fit(fit.effects, fit.values, descent=Descent("own"), part="fitted")
@@ -248,8 +243,12 @@ def findings(prepared: Prepared, case: Case, choice: Choice) -> PartDiagnosis:
         records = list(prepared.records.values())
         change = baseline.compared(records, prepared.case.outputs, part.own)
     verdict = verdict_of(choice, stages, effects, budget)
-    if other:
-        verdict = "ambiguous"
+    if other := {one.name for one in effects if prepared.is_otherwise(one)}:
+        effects = tuple(
+            replace(one, probability=MOST * one.probability) if one.name in other else one
+            for one in effects
+        )
+        verdict = "ambiguous" if verdict in ("effect", "mostly") else verdict
     lone = lone_channel(outputs, case.nominal) if verdict == "unexplained" else ""
     verdict, stages = beside_healthy(verdict, stages, baseline, change)
     curves = None
