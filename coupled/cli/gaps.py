@@ -252,7 +252,8 @@ def _write_improved(
     curves = whole.curves if with_curves else ()
     # The trim was taken from the record, and is no change of the rig file; nor is the frame rate
     # of a rig without controls.
-    judged = trimmed(filed, records)[0] if filed.controls else whole.nominal
+    trims, _ = trimmed(filed, records)
+    judged = next(iter(trims.values())) if filed.controls else whole.nominal
     changes = differences(judged, improved)
     remark += "".join(f"added: {one.key}, {one.lists} over {one.of}; no cause\n" for one in curves)
     effects, fitted_again = (whole.credible, changes) if curves else (whole.effects, {})

@@ -351,31 +351,36 @@ def rig_of_manifests(records: Mapping[str, Record]) -> Rig:
     return next(iter(found.values()))
 
 
-def trimmed(rig: Rig, records: Mapping[str, Record]) -> tuple[Rig, str]:
-    """Return a rig with the trim at the start of the records, and a sentence about the change.
+def trimmed(rig: Rig, records: Mapping[str, Record]) -> tuple[dict[str, Rig], str]:
+    """Return the rig in the trim at the start of each record, and sentences about the changes.
 
-    The sentence is empty if the trim is that of the rig file, or if there is no aircraft. Raises
-    InputError if a manifest has another aircraft, if the records differ in their trim, or if the
-    aircraft cannot be trimmed at it.
+    A record without a sentence starts in the rig file's trim. Raises InputError if a manifest has
+    another aircraft, or if the aircraft cannot be trimmed at a record's start.
     """
-    if rig.flight is None:
-        return rig, ""
-    each = {file: _manifest_trim(rig.flight, record, file) for file, record in records.items()}
-    first, taken = next(iter(each.items()))
-    for file, other in each.items():
-        if other != taken:
-            problem = f"was flown from another trim than {first}: diagnose the two one by one"
-            raise InputError(file, "flight", problem)
-    source = f"the manifest of {first}"
-    if taken is None:
-        taken, source = _measured_trim(rig, records[first], first), f"the first rows of {first}"
-    new = {key: value for key, value in taken.items() if not _same(rig.flight, key, value)}
-    if not new:
-        return rig, ""
-    was = ", ".join(_change(rig.flight, key, value) for key, value in new.items())
-    return rig.changed({f"flight.{key}": value for key, value in new.items()}), (
-        f"Trim taken from {source}, not from the rig file: {was}."
-    )
+    found, said = dict[str, Rig](), dict[str, str]()
+    for file, record in records.items():
+        found[file] = rig
+        if rig.flight is None:
+            continue
+        taken, source = _manifest_trim(rig.flight, record, file), f"the manifest of {file}"
+        if taken is None:
+            taken, source = _measured_trim(rig, record, file), f"the first rows of {file}"
+        new = {key: value for key, value in taken.items() if not _same(rig.flight, key, value)}
+        if new:
+            found[file] = rig.changed({f"flight.{key}": value for key, value in new.items()})
+            was = ", ".join(_change(rig.flight, key, value) for key, value in new.items())
+            said.setdefault(was, f"Trim taken from {source}, not from the rig file: {was}.")
+    return found, " ".join(said.values())
+
+
+def trim_in(rig: Rig, other: Rig) -> dict[str, Any]:
+    """Return the fields of a rig's `flight` in which its trim differs from another's."""
+    fields = () if rig.flight is None else [_FIELDS[key] for key in TRIM_KEYS]
+    return {
+        name: getattr(rig.flight, name)
+        for name in fields
+        if getattr(rig.flight, name) != getattr(other.flight, name)
+    }
 
 
 def _same(flight: Flight, key: str, value: Any) -> bool:
@@ -478,9 +483,12 @@ def _climbs(record: Record, angle: float) -> bool:
 
 
 def unmeasured_trim(rig: Rig, records: Mapping[str, Record]) -> str:
-    """Return a sentence on a trim that no record and no manifest shows; empty if one does."""
-    flight, (file, record) = rig.flight, next(iter(records.items()))
-    if flight is None or SPEED in record or _manifest_trim(flight, record, file) is not None:
+    """Return a sentence on a trim that a record and its manifest do not show; empty if they do."""
+    flight = rig.flight
+    if flight is None or all(
+        SPEED in record or _manifest_trim(flight, record, file) is not None
+        for file, record in records.items()
+    ):
         return ""
     return (
         f"Without {SPEED} the trim is the rig file's: {CALIBRATED} {flight.calibrated_airspeed:.4g}"

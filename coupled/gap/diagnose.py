@@ -272,6 +272,7 @@ def findings(prepared: Prepared, case: Case, choice: Choice) -> PartDiagnosis:
         nominal=case.nominal,
         improved=fit.rig,
         records=dict(prepared.records),
+        readers=readers,
         outputs=tuple(outputs),
         choice=choice,
         baseline=baseline,

@@ -36,7 +36,7 @@ from coupled.gap.effects.effect import (
 from coupled.gap.effects.library import BY_NAME, EFFECTS, LAG
 from coupled.gap.effects.linkage import SERVO
 from coupled.gap.effects.settings import CLOCK, Scales, contact, in_scale, is_dry
-from coupled.gap.prepare import as_driven, readers_of
+from coupled.gap.prepare import as_driven, in_own_trims, readers_of
 from coupled.gap.search.case import Case, Tell
 from coupled.gap.search.fit import fit_set
 from coupled.gap.search.found import Alike, Fit, alike
@@ -264,13 +264,15 @@ class NominalFit(TableResult):
         }
 
 
-def _flown_as_recorded(rig: Rig, records: Mapping[str, Record], keys: Sequence[str]) -> Rig:
-    """Return the rig with the trim of the records, if keys of its aircraft are fitted.
+def _flown_as_recorded(
+    rig: Rig, records: Mapping[str, Record], keys: Sequence[str]
+) -> dict[str, Rig]:
+    """Return the rig of each record, with its trim if keys of its aircraft are fitted.
 
     An aircraft alone takes their rate too. Raises InputError if it is given no keys.
     """
     if rig.controls and not any(key.startswith("flight.") for key in keys):
-        return rig
+        return dict.fromkeys(records, rig)
     if not keys:
         problem = 'the rig has an aircraft only: give its keys, as "flight.pitch_damping"'
         raise InputError(rig.file or rig.name, "--free", problem)
@@ -294,15 +296,16 @@ def fit_nominal(
     rig = as_driven(rig, list(records.values()), control) if control in rig.controls else rig
     for file, record in records.items():
         check_units(rig, record, control, file)
-    filed, rig = rig, _flown_as_recorded(rig, records, keys)
+    trims = _flown_as_recorded(rig, records, keys)
+    filed, rig = rig, next(iter(trims.values()))
     for file, record in records.items():
-        check_record(rig, record, control, file)
-    readers = readers_of(rig, records, control)
+        check_record(trims[file], record, control, file)
+    readers = readers_of(trims, records, control)
     outputs = list[Output]()
     for reader in readers:
         outputs += reader.outputs()
         outputs += airframe_outputs(reader.rig, reader.record, reader.number)
-    outputs = [output.halved(rig) for output in outputs]
+    outputs = [output.halved(rig) for output in in_own_trims(outputs, readers)]
     if not outputs:
         problem = "holds too little to judge any stage by, so nothing can be fitted"
         raise InputError(next(iter(records)), "", problem)

@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
@@ -42,6 +42,7 @@ from coupled.gap.checks import (
     not_in_trim,
     not_measured,
     other_air,
+    trim_in,
     trim_speed,
     trimmed,
 )
@@ -131,25 +132,25 @@ def prepare(
     rig = as_driven(rig, each, control) if control in rig.controls else rig
     for file, record in records.items():
         check_units(rig, record, control, file)
-    rig, trim = trimmed(rig, records)
+    trims, trim = trimmed(as_counted(rig, each, control) if rig.controls else rig, records)
+    rig = next(iter(trims.values()))
     for file, record in records.items():
-        check_record(rig, record, control, file, moved=part.own)
+        check_record(trims[file], record, control, file, moved=part.own)
         if rig.flight is not None:
-            check_trim(trim_speed(rig), record, file)
-    if rig.controls:
-        rig = as_counted(rig, each, control)
-    else:
+            check_trim(trim_speed(trims[file]), record, file)
+    if not rig.controls:
         check_moved_by_pilot(rig)
-    judged = Judged(rig, part, readers_of(rig, records, control), baseline)
+    readers = readers_of(trims, records, control)
+    judged = Judged(rig, part, readers, baseline)
     outputs = [
         allowing_for_contact(output.halved(rig), rig, control) for output in judged.under(rig)
     ]
     if not outputs:
-        raise InputError(next(iter(records)), "", _too_little(rig, control, judged.readers))
+        raise InputError(next(iter(records)), "", _too_little(rig, control, readers))
     check_against_model(outputs, rig, list(records), each)
-    check_labels(outputs, rig, records)
+    check_labels(outputs, readers, records)
     own = control if part.own else None
-    set_points = judged.readers[0].set_points
+    set_points = readers[0].set_points
     repeated = [
         words for file, one in records.items() for words in not_measured(one, own, file, set_points)
     ]
@@ -159,7 +160,7 @@ def prepare(
     densities = dict[str, float]()
     if any(output.stage == AIRFRAME for output in outputs):
         left_out += [not_judged(each), *(not_in_trim(one, file) for file, one in records.items())]
-        densities = {file: density_of(rig, one) for file, one in records.items()}
+        densities = {file: density_of(trims[file], one) for file, one in records.items()}
         left_out += [other_air(density, file) for file, density in densities.items()]
     library = [one for one in library_of(rig, control) if part.frees(keys_of([one]))]
     if terms and part.airframe:
@@ -167,8 +168,8 @@ def prepare(
     return Prepared(
         part,
         Case(rig, control, outputs, tell, judged.under, model_error_in_floors=baseline is not None),
-        tuple(tried_effects(library, judged.readers, outputs)),
-        tuple(judged.readers),
+        tuple(tried_effects(library, readers, outputs)),
+        tuple(readers),
         records,
         trim,
         tuple(dict.fromkeys(words for words in left_out if words)),
@@ -178,10 +179,21 @@ def prepare(
     )
 
 
-def readers_of(rig: Rig, records: Mapping[str, Record], control: ControlName) -> list[Reader]:
-    """Return the reader of each record, which makes its outputs."""
-    each = enumerate(records.values())
-    return [Reader(rig, record, control, surface_points, number) for number, record in each]
+def readers_of(
+    rigs: Mapping[str, Rig], records: Mapping[str, Record], control: ControlName
+) -> list[Reader]:
+    """Return the reader of each record, which makes its outputs; `rigs` has each in its trim."""
+    first = next(iter(rigs.values()))
+    return [
+        Reader(rigs[file], record, control, surface_points, number, trim_in(rigs[file], first))
+        for number, (file, record) in enumerate(records.items())
+    ]
+
+
+def in_own_trims(outputs: Sequence[Output], readers: Sequence[Reader]) -> list[Output]:
+    """Return outputs whose predictions are by a rig in the trim of their record."""
+    each = ((output, readers[output.record]) for output in outputs)
+    return [output.predicted_by(one.in_trim) if one.trim else output for output, one in each]
 
 
 @dataclass(frozen=True)
@@ -209,14 +221,15 @@ class Judged:
         return known
 
     def _made(self, rig: Rig) -> list[Output]:
-        readers = [replace(reader, rig=rig) for reader in self.readers]
+        readers = [reader.under(rig) for reader in self.readers]
         own = readers if self.part.own else []
         makers: list[Callable[[], list[Output]]] = [reader.outputs for reader in own]
         alike = bool(self._known) and _has_same_flight(self.rig, rig)
         for one in readers if self.part.airframe and not alike else []:
             flights = self._flights.setdefault(one.number, Flights())
             makers.append(partial(airframe_outputs, one.rig, one.record, one.number, flights))
-        made = [output for each in in_threads(lambda make: make(), makers) for output in each]
+        each = in_threads(lambda make: make(), makers)
+        made = in_own_trims([output for outputs in each for output in outputs], readers)
         if alike:
             made += self._flown
         elif rig == self.rig:

@@ -14,9 +14,8 @@ from coupled.gap.effects.effect import Effect
 from coupled.gap.findings.diagnosis import PartDiagnosis
 from coupled.gap.findings.result import StageResult
 from coupled.gap.findings.summary import plain
-from coupled.gap.prepare import readers_of
 from coupled.gap.signals.output import Floats, Output
-from coupled.gap.stages.stages import Reader
+from coupled.gap.signals.reading import Reading
 from coupled.gap.thresholds import FAULTY_FROM
 from coupled.record.channels import CONTROL_NAMES
 from coupled.record.record import Record
@@ -134,9 +133,9 @@ class View:
     def _left(self, output: Output) -> float:
         return output.gap(self.diagnosis.improved)
 
-    def readers(self, rig: Rig) -> list[Reader]:
+    def readers(self, rig: Rig) -> list[Reading]:
         """Return what reads the stages' inputs off each record."""
-        return readers_of(rig, self.diagnosis.records, self.diagnosis.part.control)
+        return [reader.under(rig) for reader in self.diagnosis.readers]
 
     def time(self, output: Output) -> Floats:
         """Return the time of an output's frames, in s from the record's start."""

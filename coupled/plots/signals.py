@@ -16,9 +16,9 @@ import numpy as np
 from coupled.display import System, in_system
 from coupled.gap.noise.smooth import rate_of, smoothed
 from coupled.gap.signals.output import Floats, Output
+from coupled.gap.signals.reading import Reading
 from coupled.gap.stages.airframe import gusts_of
 from coupled.gap.stages.openloop import command_of
-from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_channel, surface_points
 from coupled.record.channels import channel, unit_of
 from coupled.rig.packing import COMMAND_SIGN
@@ -36,7 +36,7 @@ STICKS = 0.1  # of a signal's own size, under which its side is not sure
 class Scene:
     """One record, its outputs, and the base: the rig without the effect looked for."""
 
-    reader: Reader
+    reader: Reading
     outputs: tuple[Output, ...]
 
     @property

@@ -90,7 +90,7 @@ def test_an_offset_of_vane_or_attitude_is_no_path(name: str) -> None:
     record = threecontrols.flown(rig, {}, 16.0)
     data = record.data.copy()
     data[:, record.channels.index(name)] += 0.01
-    assert trimmed(rig, {"r": Record(record.channels, data)}) == (rig, "")
+    assert trimmed(rig, {"r": Record(record.channels, data)}) == ({"r": rig}, "")
 
 
 def test_a_trim_that_is_the_rig_files_own_is_not_talked_of(filed: Rig) -> None:
@@ -121,14 +121,39 @@ def test_without_a_rig_the_manifests_is_taken(slow_737: Record) -> None:
         api.diagnose(None, {"a": slow_737, "b": other})
 
 
-def test_another_aircraft_and_another_trim_are_refused(slow_737: Record, filed: Rig) -> None:
+def test_another_aircraft_and_a_record_without_its_trim_are_refused(
+    slow_737: Record, filed: Rig
+) -> None:
     with pytest.raises(InputError, match="'737' in the manifest, 'T37' in the rig file"):
         api.diagnose("t37", slow_737)
     fast = api.fly(read_run("pull-up-737")[1]).record
-    with pytest.raises(InputError, match="b: flight: was flown from another trim than a"):
-        api.diagnose(filed, {"a": slow_737, "b": fast})
+    later = Record(fast.channels, fast.data, slow_737.manifest)
     with pytest.raises(InputError, match="b: true_airspeed_m_per_s: starts at"):
-        api.diagnose(filed, {"a": bare(slow_737), "b": bare(fast)})
+        api.diagnose(filed, {"a": slow_737, "b": later})
+
+
+@pytest.mark.parametrize("faster", [1.02, pytest.param(1.25, marks=pytest.mark.slow)])
+def test_each_record_is_flown_from_its_own_trim(faster: float) -> None:
+    """A record 2 % faster than the first was flown from the first one's trim, and had a gap."""
+    rig = noisy(api.load_rig("c172p"))
+    speed = rig["flight.calibrated_airspeed_m_per_s"]
+
+    def flown(damping: float) -> dict[str, Record]:
+        return {
+            name: bare(
+                threecontrols.flown(
+                    rig, {CAS: one, "flight.roll_damping": damping}, 12.0, pedals=160.0
+                )
+            )
+            for name, one in (("a", speed), ("b", faster * speed))
+        }
+
+    well = api.diagnose(rig, flown(1.0))
+    assert well.verdict == "no_gap"
+    assert well.trim.count("Trim taken from") == 1 and "the first rows of b" in well.trim
+    found = api.diagnose(rig, flown(0.7))
+    assert [effect.name for effect in found.effects] == ["roll_damping"]
+    assert found.effects[0].value == pytest.approx(0.7, rel=0.01)
 
 
 def test_the_help_pages_example_runs_on_the_guides_record(tmp_path: Path, slow_737: Record) -> None:

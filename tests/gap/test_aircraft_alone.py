@@ -171,7 +171,7 @@ def test_a_channel_that_alone_has_a_gap_is_named(
     data = healthy.data * scales
     data[:, 1:] += np.random.default_rng(1).normal(0.0, 1e-3, data[:, 1:].shape)
     record = Record(healthy.channels, data)
-    rig, _ = trimmed(at_rate_of(alone(), {"log": record}), {"log": record})
+    rig = trimmed(at_rate_of(alone(), {"log": record}), {"log": record})[0]["log"]
     outputs = airframe_outputs(rig, record)
     words = lone_channel(outputs, rig)
     assert ("Of the motion yaw_rate_rad_per_s alone has a gap" in words) is told
@@ -180,7 +180,7 @@ def test_a_channel_that_alone_has_a_gap_is_named(
 
 def test_air_of_another_density_is_named(healthy: Record) -> None:
     """A hot day, or an altitude above the ground, was a mass and three inertias of 0.89 each."""
-    rig, _ = trimmed(at_rate_of(alone(), {"log": healthy}), {"log": healthy})
+    rig = trimmed(at_rate_of(alone(), {"log": healthy}), {"log": healthy})[0]["log"]
     standard = 1.0902 * 0.5 * healthy["true_airspeed_m_per_s"] ** 2  # at 1200 m
 
     def measured(density: float) -> float:
@@ -272,8 +272,9 @@ def test_a_log_that_was_imported_beside_a_rig_is_trimmed_as_it_begins(tmp_path: 
     assert account.clock.frame_rate_Hz == 30.0  # an aircraft alone has no host whose frames count
     manifest = {"rig": json.loads(alone().model_dump_json()), "imported_from": log.name}
     known = Record(record.channels, record.data, manifest)
-    rig, said = trimmed(at_rate_of(alone(), {"log": known}), {"log": known})
-    assert rig.flight is not None and rig.flight.calibrated_airspeed == pytest.approx(52.0, abs=1.0)
+    trims, said = trimmed(at_rate_of(alone(), {"log": known}), {"log": known})
+    flight = trims["log"].flight
+    assert flight is not None and flight.calibrated_airspeed == pytest.approx(52.0, abs=1.0)
     assert "the first rows of log" in said
 
 

@@ -68,7 +68,8 @@ def test_friction_and_damping_that_changed_are_told_from_the_scatter_of_the_heal
     rig = ball_screw_rig()
 
     def known(records: list[Record]) -> tuple[list[Record], list[Output]]:
-        readers = readers_of(rig, {str(i): one for i, one in enumerate(records)}, "column")
+        files = {str(i): one for i, one in enumerate(records)}
+        readers = readers_of(dict.fromkeys(files, rig), files, "column")
         return records, [output for reader in readers for output in reader.outputs()]
 
     well = known([ball_screw(1000 + seed) for seed in range(12)])

@@ -40,9 +40,9 @@ def moved(rig: Rig, changes: dict[str, Any], without: str = "", from_s: float = 
 def test_a_healthy_record_may_begin_in_motion(without: str) -> None:
     rig = bench({})
     record = moved(rig, {}, without)
-    [reader] = readers_of(rig, {"r": record}, "column")
+    [reader] = readers_of({"r": rig}, {"r": record}, "column")
     assert reader.begins_moved
-    assert not readers_of(rig, {"r": moved(rig, {}, without, 0.0)}, "column")[0].begins_moved
+    assert not readers_of({"r": rig}, {"r": moved(rig, {}, without, 0.0)}, "column")[0].begins_moved
     found = diagnose(rig, {"r": record})
     assert found.verdict == "no_gap", found.summary
     assert any(stage.name == "loader" and stage.gap is not None for stage in found.stages)

@@ -84,6 +84,7 @@ def diagnosis_of(case: Case, effects: list[Effect], rival: Effect | None = None)
     held = ChannelShrink("column_computed_m", 1.0, 1.0, 1.0, 8)
     return PartDiagnosis(
         part=Part("column"),
+        readers=(Reader(nominal, record, "column", surface_points),),
         control="column",
         verdict="effect" if effects else "no_gap",
         stages=tuple(StageResult(s, g, g, 1.2, 1.0, s in blamed) for s, g in gaps.items()),

@@ -52,7 +52,7 @@ def test_no_force_is_proposed_to_a_bench_that_imposes_the_motion() -> None:
 
 
 def test_of_the_linkage_play_and_contact_alone_show_in_the_force_of_a_moved_loader() -> None:
-    reader = readers_of(damper_rig(), {"r": damper(seconds=6.0)}, "column")[0]
+    reader = readers_of({"r": damper_rig()}, {"r": damper(seconds=6.0)}, "column")[0]
     library = as_judged(EFFECTS, [reader], reader.outputs())
     moved = [effect for effect in library if effect.stage == "linkage"]
     names = ["backlash", "soft_backlash", "yielding_contact"]

@@ -168,7 +168,7 @@ def test_an_effect_of_a_part_that_the_model_lacks_is_not_tried(
     output = Output("airframe", "yaw_rate_rad_per_s", rate, lambda _: rate, 1.0, 120.0)
 
     def tried(rig: Rig) -> set[str]:
-        readers = readers_of(rig, {"r": motion}, "column")
+        readers = readers_of({"r": rig}, {"r": motion}, "column")
         return {effect.name for effect in tried_effects(EFFECTS, readers, [output])}
 
     assert tried(cessna) - tried(own) == {"adverse_yaw"}
@@ -184,7 +184,7 @@ def test_effects_of_lateral_motion_are_tried_where_it_moves(cessna: Rig, worn: R
     every = [*EFFECTS, term(CLP, "ROLL"), term("aero/coefficient/Cmq", "PITCH")]
 
     def tried(record: Record) -> set[str]:
-        readers = readers_of(cessna, {"r": record}, "column")
+        readers = readers_of({"r": cessna}, {"r": record}, "column")
         return {effect.name for effect in tried_effects(every, readers, [output])}
 
     lateral = {effect.name for effect in AIRFRAME if effect.needs} - {"vertical_gust"}

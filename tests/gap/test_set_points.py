@@ -73,7 +73,7 @@ def test_one_record_that_shows_set_points_is_enough_for_the_machine() -> None:
 
 def _tried(record: Record) -> list[Effect]:
     """Return the effects that a record of set points lets be tried."""
-    readers = readers_of(servo_rig(), {"r": record}, "column")
+    readers = readers_of({"r": servo_rig()}, {"r": record}, "column")
     outputs = [Output(stage, stage, POINTS, lambda _: POINTS, 1.0, 50.0) for stage in STAGES]
     return tried_effects(EFFECTS, readers, outputs)
 

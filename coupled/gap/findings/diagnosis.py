@@ -49,7 +49,7 @@ from coupled.gap.findings.summary import (
 from coupled.gap.search.case import Case
 from coupled.gap.search.found import Alike, Choice
 from coupled.gap.signals.output import Output
-from coupled.gap.signals.reading import worth_recording
+from coupled.gap.signals.reading import Reading, worth_recording
 from coupled.gap.thresholds import CERTAIN
 from coupled.record.channels import ControlName
 from coupled.record.record import Record
@@ -289,6 +289,7 @@ class PartDiagnosis(Diagnosis):
     """The diagnosis of one control, or of the airframe alone (`part`)."""
 
     part: Part
+    readers: tuple[Reading, ...] = field(repr=False, compare=False)
     outputs: tuple[Output, ...] = field(repr=False, compare=False)
     choice: Choice = field(repr=False, compare=False)
     baseline: Baseline | None = field(default=None, repr=False, compare=False)

@@ -193,6 +193,15 @@ class Output:
         more = noise.unsure * self.smoothed**2
         return replace(self, unsure=math.sqrt(1.0 + more) - 1.0, _known=[])
 
+    def predicted_by(self, rig_of: Callable[[Rig], Rig]) -> Output:
+        """Return the output with its predictions by another rig, a function of the given one."""
+
+        def by(predict: Predict | None) -> Predict | None:
+            return None if predict is None else lambda rig: predict(rig_of(rig))
+
+        made = replace(self, rough=by(self.rough), shots=by(self.shots), _known=[])
+        return replace(made, predict=lambda rig: self.predict(rig_of(rig)))
+
     def by_shots(self) -> Output:
         """Return the output predicted by multiple shooting, if it can be."""
         if self.shots is None:

@@ -8,9 +8,10 @@ a rig has that of the first.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any, Self
 
 import numpy as np
 
@@ -130,6 +131,18 @@ class Reading:
     # The map from a control's commands to surface positions; None if the aircraft moves it too.
     surface_points: Callable[[Rig, ControlName], tuple[Floats, Floats] | None]
     number: int = 0  # of the record, where there are several
+    # Fields of the rig's `flight` with the trim of this record, if it is not that of the first.
+    trim: Mapping[str, Any] = field(default_factory=dict)
+
+    def under(self, rig: Rig) -> Self:
+        """Return the reading with another rig, in the trim of the record."""
+        return replace(self, rig=self.in_trim(rig))
+
+    def in_trim(self, rig: Rig) -> Rig:
+        """Return a rig in the trim of the record."""
+        if rig.flight is None or not self.trim:
+            return rig
+        return rig.model_copy(update={"flight": rig.flight.model_copy(update={**self.trim})})
 
     @cached_property
     def missed(self) -> Missed:

@@ -7,7 +7,7 @@ the aircraft, a rate does not show the sign of one of them.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations
 
@@ -15,6 +15,7 @@ import numpy as np
 
 from coupled.errors import InputError
 from coupled.gap.signals.output import Floats, Output
+from coupled.gap.signals.reading import Reading
 from coupled.gap.stages.airframe import COMPARED, gusts_of
 from coupled.gap.stages.surfaces import surface_channel
 from coupled.gap.thresholds import LESSER
@@ -29,15 +30,17 @@ _KINDS = (
 )
 
 
-def check_labels(outputs: Sequence[Output], rig: Rig, records: Mapping[str, Record]) -> None:
+def check_labels(
+    outputs: Sequence[Output], readers: Sequence[Reading], files: Collection[str]
+) -> None:
     """Raise InputError if a reversed channel, or two exchanged ones, explain a record's gap.
 
     They do if without them the model predicts each channel better than rest does, and the gap is
     far smaller.
     """
-    for number, (file, record) in enumerate(records.items()):
-        own = [one for one in outputs if one.record == number and one.channel in COMPARED]
-        _check(rig, record, {one.channel: one for one in own}, file)
+    for reader, file in zip(readers, files, strict=True):
+        own = [one for one in outputs if one.record == reader.number and one.channel in COMPARED]
+        _check(reader.rig, reader.record, {one.channel: one for one in own}, file)
 
 
 def _check(rig: Rig, record: Record, judged: Mapping[str, Output], file: object) -> None:
