@@ -242,7 +242,12 @@ def findings(prepared: Prepared, case: Case, choice: Choice) -> PartDiagnosis:
     if baseline is not None:
         records = list(prepared.records.values())
         change = baseline.compared(records, prepared.case.outputs, part.own)
-    verdict = verdict_of(choice, stages, effects, budget)
+    verdict, curves = verdict_of(choice, stages, effects, budget), None
+    if part.own and verdict != "no_gap":
+        curves = find_curves(case, choice, effects, [reader.record for reader in readers])
+    if curves is not None and curves.instead:
+        effects = tuple(map(curves.probable, effects))
+        verdict = verdict_of(choice, stages, effects, budget)
     if other := {one.name for one in effects if prepared.is_otherwise(one)}:
         effects = tuple(
             replace(one, probability=MOST * one.probability) if one.name in other else one
@@ -251,9 +256,6 @@ def findings(prepared: Prepared, case: Case, choice: Choice) -> PartDiagnosis:
         verdict = "ambiguous" if verdict in ("effect", "mostly") else verdict
     lone = lone_channel(outputs, case.nominal) if verdict == "unexplained" else ""
     verdict, stages = beside_healthy(verdict, stages, baseline, change)
-    curves = None
-    if part.own and verdict in ("mostly", "unexplained"):
-        curves = find_curves(case, choice, effects, [reader.record for reader in readers])
     filtered = (one.filtered().items() for one in readers) if part.own else ()
     return PartDiagnosis(
         part=part,

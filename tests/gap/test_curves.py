@@ -15,6 +15,7 @@ from coupled.gap.diagnose import findings
 from coupled.gap.findings.curvefit import LAWS, Basis, choose, closed_form
 from coupled.gap.findings.curves import response_to_force
 from coupled.gap.findings.diagnosis import PartDiagnosis
+from coupled.gap.findings.flown import fly_force
 from coupled.gap.noise.smooth import smoothed
 from coupled.gap.prepare import prepare
 from coupled.gap.search.beam import search_sets
@@ -158,6 +159,41 @@ def test_a_curve_is_reported_and_drawn_and_no_cause(entry: PartDiagnosis) -> Non
     assert table.caption.startswith("A curve of the schedule, no cause; it closes ")
     assert table.heads[1] == "controls.column.schedule.gradient_curve, lb/in"
     assert len(draw_curves(View(entry)).axes) == 1
+
+
+SERIES = ("gradient_error", "cubic_stiffness", "friction_ripple", "viscous_damping")
+PULL_N = 30.0 * np.sin(np.cumsum(np.geomspace(0.01, 0.08, 1800)))
+
+
+def diagnosed(changes: dict[str, object]) -> PartDiagnosis:
+    """Return the diagnosis of a bench with changes of its loader, by the effects of `SERIES`."""
+    noise = {"column_force_N": 0.15, "column_computed_m": 2e-5, "column_deflection_m": 4e-5}
+    loader = {f"controls.column.loader.{key}": value for key, value in changes.items()}
+    real = RIG.changed({"noise": noise, **loader})
+    record = fly_force(real, {"column": PULL_N}, np.full(len(PULL_N), 2000.0), seed=4)
+    prepared = prepare(RIG, {"r.csv": record}, Part("column"))
+    library = [effect for effect in prepared.library if effect.name in SERIES]
+    return findings(prepared, *search_sets(prepared.case, library))
+
+
+def test_effects_that_approximate_a_curve_are_less_probable_than_the_curve() -> None:
+    """A spring with a dead zone was a gradient error and a cubic stiffness of 0.89 each."""
+    zone = {"deflection_m": [-0.1, -1e-3, 1e-3, 0.1], "force_N": [1.65, 1.65, -1.65, -1.65]}
+    found = diagnosed({"force_curve": zone})
+    assert found.verdict == "unexplained"
+    assert len(found.effects) > 1
+    assert max(one.probability for one in found.effects) < 0.1
+    (curve,) = found.curves
+    assert curve.key == "controls.column.loader.force_curve"
+    assert curve.closed > 0.95
+    assert "It describes the gap better than " in found.summary
+
+
+def test_effects_that_leave_noise_alone_keep_their_probability() -> None:
+    found = diagnosed({"cubic_N_per_m3": 3e5, "damping_N_s_per_m": 105.0})
+    assert found.verdict == "effect"
+    assert {one.name for one in found.effects} == {"viscous_damping", "cubic_stiffness"}
+    assert found.curves == ()
 
 
 @pytest.mark.parametrize("first", [0.0, -0.02])

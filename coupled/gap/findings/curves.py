@@ -13,7 +13,8 @@ the same size in all halves of the record. The curve of an intermittent or fadin
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -43,10 +44,17 @@ from coupled.gap.findings.curvefit import (
     with_nodes,
 )
 from coupled.gap.findings.result import EffectResult
+from coupled.gap.findings.summary import joined, plain
 from coupled.gap.findings.where import signals
 from coupled.gap.noise.smooth import smoothed
 from coupled.gap.search.case import Case
-from coupled.gap.search.evidence import evidence, evidence_of, fewest_unexplained, misfit
+from coupled.gap.search.evidence import (
+    Evidence,
+    evidence,
+    evidence_of,
+    fewest_unexplained,
+    misfit,
+)
 from coupled.gap.search.found import Choice, Fit
 from coupled.gap.search.problem import ModelError, Problem
 from coupled.gap.signals.output import Floats, Output, explained_below, stage_gaps, stage_limits
@@ -120,52 +128,130 @@ class Curves:
     """The curves found, and the rig with the credible effects and with them.
 
     `shrink` is the reduction of the gap in each channel that they change, with curves that are
-    fitted to the other stretches.
+    fitted to the other stretches. `instead` are the effects that the curves describe better, and
+    `odds` the odds of these effects against the curves.
     """
 
     found: tuple[Curve, ...]
     rig: Rig
     shrink: tuple[ChannelShrink, ...]
+    instead: frozenset[str] = frozenset()
+    odds: float = math.inf
+
+    def better_than(self, names: Sequence[str]) -> str:
+        """Return a sentence on those of some effects that the curves describe better."""
+        ours = joined([plain(name) for name in names if name in self.instead])
+        it, is_one = ("It", "one") if len(self.found) == 1 else ("They", "them")
+        describe = "describes" if len(self.found) == 1 else "describe"
+        return f"{it} {describe} the gap better than {ours}, which may only approximate {is_one}."
+
+    def probable(self, effect: EffectResult) -> EffectResult:
+        """Return an effect with the probability that it has beside the curves."""
+        if effect.name not in self.instead:
+            return effect
+        share = self.odds / (1.0 + self.odds)
+        return replace(effect, probability=share * effect.probability)
 
 
 def find_curves(
     case: Case, choice: Choice, effects: Sequence[EffectResult], records: Sequence[Record]
 ) -> Curves | None:
-    """Return curves of the stages that the credible effects do not explain; None if none."""
+    """Return curves of the stages that the credible effects do not explain; None if none.
+
+    The curves are fitted beside the credible effects. Several effects of such a stage may be terms
+    of a series that approximates one curve: they compete with the curves without them, by evidence.
+    A single law that leaves little may only be rough, and does not compete.
+    """
     sure = {one.name for one in effects if one.probability >= CERTAIN}
     problem = Problem(case)
-    kept = [one for one in choice.fit.effects if one.name in sure]
-    base = choice.fit if kept else choice.without_effects
-    if kept and len(kept) < len(choice.fit.effects):
-        base = problem.fit(kept, choice.fit.values)
-    found: list[Curve] = []
-    rig = half = base.rig
-    while open_stages := _open_stages(case, choice, rig):
-        one = _Fitter(case, problem, base, rig, choice.fit, records).best(open_stages)
-        if one is None:
-            break
-        curve, rig, law, fitted = one
-        found.append(curve)
-        half = with_curve(half, case.control, law, *fitted) or half
-    if not found:
-        return None
-    closed = tuple(
-        channel_shrink(output, case.nominal, half, 1.0, improved=True)
-        for output in case.outputs
-        if not np.array_equal(output.residual(rig), output.residual(base.rig))
-    )
-    return Curves(tuple(found), rig, closed)
+    error = problem.model_error(choice.without_effects.rig)
+    beside = _Curved.of(problem, choice, sure, records)
+    ours = _above_noise(problem, choice)
+    if len(ours) < 2:
+        return beside.curves(case)
+    alone = _Curved.of(problem, choice, {e.name for e in choice.fit.effects} - ours, records)
+    instead = alone.curves(case)
+    if instead is None:
+        return beside.curves(case)
+    known = [
+        evidence(problem, choice.fit, error),
+        *(one.evidence(error) for one in (beside, alone)),
+    ]
+    samples = fewest_unexplained(known)
+    by_effects, *others, by_curves = (one.log(samples) for one in known)
+    ahead = by_curves - max(by_effects, *others)
+    if ahead < 0.0:
+        return beside.curves(case)
+    return replace(instead, instead=ours, odds=math.exp(-ahead))
 
 
-def _open_stages(case: Case, choice: Choice, rig: Rig) -> set[str]:
-    """Return the stages whose residual with a rig exceeds that of an explained stage."""
+@dataclass(frozen=True)
+class _Curved:
+    """The curves found beside the effects of `base`: the rig with them, and with those by `half`.
+
+    `half` are fitted to every other stretch. `rest` is that of the curves' evidence.
+    """
+
+    problem: Problem
+    base: Fit
+    found: tuple[Curve, ...]
+    rig: Rig
+    half: Rig
+    rest: float
+
+    @classmethod
+    def of(
+        cls, problem: Problem, choice: Choice, names: Collection[str], records: Sequence[Record]
+    ) -> _Curved:
+        """Return the curves beside some of the effects found."""
+        case, kept = problem.case, [e for e in choice.fit.effects if e.name in names]
+        base = choice.fit if kept else choice.without_effects
+        if kept and len(kept) < len(choice.fit.effects):
+            base = problem.fit(kept, choice.fit.values)
+        made = cls(problem, base, (), base.rig, base.rig, 0.0)
+        while open_outputs := _open_outputs(case, choice, made.rig):
+            stages = {stage_of(at) for at in open_outputs}
+            one = _Fitter(case, problem, base, made.rig, choice.fit, records).best(stages)
+            if one is None:
+                break
+            curve, rig, law, fitted, rest = one
+            half = with_curve(made.half, case.control, law, *fitted) or made.half
+            made = cls(problem, base, (*made.found, curve), rig, half, made.rest + rest)
+        return made
+
+    def evidence(self, error: ModelError) -> Evidence:
+        """Return the evidence of the curves and of the effects of the base."""
+        rest = evidence(self.problem, self.base, error).rest + self.rest
+        return evidence_of(self.problem, self.rig, error, rest)
+
+    def curves(self, case: Case) -> Curves | None:
+        """Return the curves; None if there are none."""
+        if not self.found:
+            return None
+        closed = tuple(
+            channel_shrink(output, case.nominal, self.half, 1.0, improved=True)
+            for output in case.outputs
+            if not np.array_equal(output.residual(self.rig), output.residual(self.base.rig))
+        )
+        return Curves(self.found, self.rig, closed)
+
+
+def _above_noise(problem: Problem, choice: Choice) -> frozenset[str]:
+    """Return the effects found that show in outputs of which they leave more than noise."""
+    left = problem.over_limit(choice.fit.rig)
+    return frozenset(one.name for one in choice.fit.effects if left & {*one.shows_in})
+
+
+def _open_outputs(case: Case, choice: Choice, rig: Rig) -> set[str]:
+    """Return the outputs whose residual with a rig exceeds that of an explained stage."""
     root = stage_gaps(case.outputs, choice.without_effects.rig)
     left, limits = stage_gaps(case.outputs, rig), stage_limits(case.outputs)
-    return {stage_of(at) for at, gap in left.items() if gap > explained_below(root[at], limits[at])}
+    return {at for at, gap in left.items() if gap > explained_below(root[at], limits[at])}
 
 
-# A curve as reported, the rig with it, its law, and its nodes and values by the fitted stretches.
-_Found = tuple[Curve, Rig, Law, Values]
+# A curve as reported, the rig with it, its law, its nodes and values by the fitted stretches, and
+# the terms of its evidence beside the likelihood.
+_Found = tuple[Curve, Rig, Law, Values, float]
 
 
 @dataclass(frozen=True)
@@ -186,27 +272,28 @@ class _Fitter:
         """Return the curve of the largest evidence that shows in stages; None if none holds.
 
         All laws compete by the evidence of their linear models, also those that no rig can have:
-        their residual follows no other signal. Of laws that the data do not tell apart, the first
-        that a rig can have is fitted: a bend, or beyond the least bend what the force adds to the
-        reading at the grip.
+        their residual follows no other signal. The others that gain are fitted further, since a
+        response is far from linear in a large curve, and compete again. Of laws that the data do
+        not tell apart, the first that a rig can have is taken: a bend, or beyond the least bend
+        what the force adds to the reading at the grip.
         """
         begun = [one for law in LAWS if (one := self._begun(law, stages)) is not None]
         above = [pick.known.log - self._likelihood(basis, self.rig) for basis, pick in begun]
-        most = max(above, default=0.0)
-        if most <= 0.0:
-            return None
-        tied = [one for one, gain in zip(begun, above, strict=True) if gain > most - RIVAL_GAIN]
         flown = [
-            (*one, rig) for one in tied if (rig := self._with(one[0].law, one[1].values(one[0])))
+            (gain, self._refined(*one, rig))
+            for one, gain in zip(begun, above, strict=True)
+            if gain > 0.0 and (rig := self._with(one[0].law, one[1].values(one[0])))
         ]
-        if not flown:
+        if not any(gain > max(above) - RIVAL_GAIN for gain, _ in flown):
             return None
-        gains = [
-            pick.known.rest + self._likelihood(basis, rig) - self._likelihood(basis, self.rig)
-            for basis, pick, rig in flown
+        known = [
+            evidence_of(self.problem, rig, self._error, pick.known.rest)
+            for _, (_, pick, rig) in flown
         ]
-        first = next(k for k, gain in enumerate(gains) if gain > max(gains) - RIVAL_GAIN)
-        basis, pick, fitted = self._refined(*flown[first])
+        samples = fewest_unexplained(known)
+        logs = [one.log(samples) for one in known]
+        first = next(k for k, log in enumerate(logs) if log > max(logs) - RIVAL_GAIN)
+        _, (basis, pick, fitted) = flown[first]
         line = straight(basis, basis.sums("fitted"))
         whole = self._basis(basis.law, basis.places, basis.outputs, pick.values(basis))
         if whole is None or pick.known.log < line + RIVAL_GAIN:
@@ -216,7 +303,9 @@ class _Fitter:
         if rig is None or not self._beats_effects(rig, last):
             return None
         curve = self._stated(whole, last, rig, fitted)
-        return None if curve is None else (curve, rig, basis.law, pick.values(basis))
+        return (
+            None if curve is None else (curve, rig, basis.law, pick.values(basis), last.known.rest)
+        )
 
     def _beats_effects(self, rig: Rig, pick: Pick) -> bool:
         """Tell whether a curve has more evidence than the effects found, and than none."""

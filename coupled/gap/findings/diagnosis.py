@@ -358,6 +358,8 @@ class PartDiagnosis(Diagnosis):
         said = summary(self, self.shrink, flight, filtered, next_test, floor)
         said += "".join(f" Not distinguished: {one.words}." for one in self.inseparable)
         said += "".join(f" {one.sentence}" for one in self.curves)
+        if self.curved is not None and self.curved.instead:
+            said += f" {self.curved.better_than([one.name for one in self.effects])}"
         held = "" if self.baseline is None else self.baseline.words
         changed = "" if self.change is None else self.change.words
         return " ".join(words for words in (held, changed, said) if words)
