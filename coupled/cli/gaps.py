@@ -234,8 +234,9 @@ def _write_improved(
 ) -> None:
     from coupled.calibration.assumed import outdated_bends
     from coupled.files import read_text
-    from coupled.gap.checks import rig_of_manifests, trimmed
+    from coupled.gap.checks import rig_of_manifests, trim_in
     from coupled.gap.findings.summary import changed
+    from coupled.gap.signals.reading import in_trim
     from coupled.rig.rigedit import differences, edited
     from coupled.rig.rigfile import read_rig
     from coupled.rig.rigwrite import rig_text
@@ -252,8 +253,8 @@ def _write_improved(
     curves = whole.curves if with_curves else ()
     # The trim was taken from the record, and is no change of the rig file; nor is the frame rate
     # of a rig without controls.
-    trims, _ = trimmed(filed, records)
-    judged = next(iter(trims.values())) if filed.controls else whole.nominal
+    nominal = whole.nominal
+    judged = in_trim(filed, trim_in(nominal, filed)) if filed.controls else nominal
     changes = differences(judged, improved)
     remark += "".join(f"added: {one.key}, {one.lists} over {one.of}; no cause\n" for one in curves)
     effects, fitted_again = (whole.credible, changes) if curves else (whole.effects, {})

@@ -53,7 +53,7 @@ from coupled.gap.findings.result import EffectResult
 from coupled.gap.search.case import Case, Tell, allowing_for_contact
 from coupled.gap.signals.live import judged_part, live_of
 from coupled.gap.signals.output import Floats, Output, estimate_noise, rounding
-from coupled.gap.signals.reading import drifts, softest_gradient, worth_recording
+from coupled.gap.signals.reading import drifts, in_trim, softest_gradient, worth_recording
 from coupled.gap.stages.airframe import Flights, airframe_outputs
 from coupled.gap.stages.labels import check_labels
 from coupled.gap.stages.openloop import not_judged
@@ -192,8 +192,11 @@ def readers_of(
 
 def in_own_trims(outputs: Sequence[Output], readers: Sequence[Reader]) -> list[Output]:
     """Return outputs whose predictions are by a rig in the trim of their record."""
-    each = ((output, readers[output.record]) for output in outputs)
-    return [output.predicted_by(one.in_trim) if one.trim else output for output, one in each]
+    each = ((output, readers[output.record].trim) for output in outputs)
+    return [
+        output.predicted_by(partial(in_trim, trim=trim)) if trim else output
+        for output, trim in each
+    ]
 
 
 @dataclass(frozen=True)

@@ -121,6 +121,13 @@ class Sensed:
 PRESSURE, LOAD = "dynamic_pressure_Pa", "load_factor"
 
 
+def in_trim(rig: Rig, trim: Mapping[str, Any]) -> Rig:
+    """Return a rig with the fields of a trim in its `flight`."""
+    if rig.flight is None or not trim:
+        return rig
+    return rig.model_copy(update={"flight": rig.flight.model_copy(update={**trim})})
+
+
 @dataclass(frozen=True)
 class Reading:
     """A record of one control of a rig: its channels, and the missing ones."""
@@ -136,13 +143,7 @@ class Reading:
 
     def under(self, rig: Rig) -> Self:
         """Return the reading with another rig, in the trim of the record."""
-        return replace(self, rig=self.in_trim(rig))
-
-    def in_trim(self, rig: Rig) -> Rig:
-        """Return a rig in the trim of the record."""
-        if rig.flight is None or not self.trim:
-            return rig
-        return rig.model_copy(update={"flight": rig.flight.model_copy(update={**self.trim})})
+        return replace(self, rig=in_trim(rig, self.trim))
 
     @cached_property
     def missed(self) -> Missed:
