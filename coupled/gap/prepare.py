@@ -132,7 +132,8 @@ def prepare(
     rig = as_driven(rig, each, control) if control in rig.controls else rig
     for file, record in records.items():
         check_units(rig, record, control, file)
-    trims, trim = trimmed(as_counted(rig, each, control) if rig.controls else rig, records)
+    rig = as_counted(rig, each, control) if control in rig.controls else rig
+    trims, trim = trimmed(rig, records)
     rig = next(iter(trims.values()))
     for file, record in records.items():
         check_record(trims[file], record, control, file, moved=part.own)
