@@ -2,14 +2,20 @@
 
 A slow sweep out and back at the dynamic pressures q̄_i gives
 
-    F = F_BO·sgn(δ) + f(δ, q̄_i) + F_c·sgn(δ')
+    F = F_BO·sgn(δ) + f(δ, q̄_i) + F_c·sgn(δ') + F_0
 
 f is linear between nodes, rises with δ and is 0 at neutral. For given nodes F is linear in F_BO,
-F_c and the rises between the nodes, none of which is negative: non-negative least squares (Lawson
-and Hanson, Solving Least Squares Problems, 1974, ch. 23). Nodes of an even grid are removed one by
-one, and the others moved, as far as the Bayesian information criterion falls. The same criterion
-decides between one curve for both sides and two. Readings near neutral, where the breakout may hold
-any force, and at turning points, where the friction reverses, are not used.
+F_c, the zero error F_0 and the rises between the nodes, of which only F_0 may be negative:
+non-negative least squares (Lawson and Hanson, Solving Least Squares Problems, 1974, ch. 23). Nodes
+of an even grid are removed one by one, and others moved and added, as far as the Bayesian
+information criterion falls. The same criterion decides between one curve for both sides and two,
+and whether there is a zero error. Readings near neutral, where the breakout may hold any force, and
+at turning points, where the friction reverses, are not used.
+
+The criterion keeps as few nodes as the noise allows, so that a bend of the curve near neutral is as
+large as the standard error of the breakout. F_BO and F_c are therefore from a fit with another node
+in the middle of the segment at neutral. This undersmoothing makes the bias small beside the
+standard error (Wasserman, All of Nonparametric Statistics, 2006, sec. 5.7).
 """
 
 from __future__ import annotations
@@ -36,6 +42,7 @@ GRID = 12  # nodes on a side to begin with
 MOVES = (0.5, 0.25, 0.125, 0.0625)  # of the grid's step
 EXACT = 1e-9  # of the largest force: a smaller residual is rounding
 LEAST_READINGS = 8
+VERY_STRONG = 10.0  # evidence by the criterion, for a zero error (Kass and Raftery, 1995)
 READINGS = 400  # of a sweep at one q̄: more rows are averaged, so that a fit takes seconds
 LOOSE = 0.05  # of the largest force: a larger residual RMS is no fit
 STEADY = 0.05  # of q̄: a larger change is another sweep
@@ -70,8 +77,10 @@ class Sweep:
 class Feel:
     """Breakout and friction in N with half of their 95 % intervals, and the curve's table.
 
-    `force` in N has a row for each of `pressure` in Pa, over `deflection` in d. `rms_N` is that of
-    the residual; `used` are the readings used.
+    `force` in N has a row for each of `pressure` in Pa, over `deflection` in d. `zero_N` is the
+    constant part of the forces, which the curve lacks. `rms_N` is that of the residual; `used` are
+    the readings used. `straight` is the deflection up to which the curve is taken as straight,
+    because too few readings are nearer to neutral; 0 if there are enough.
     """
 
     breakout_N: float
@@ -82,6 +91,8 @@ class Feel:
     deflection: Floats
     force: Floats
     rms_N: float
+    zero_N: float
+    straight: float
     sweep: Sweep
     used: NDArray[np.bool_]
 
@@ -92,6 +103,12 @@ class Feel:
         if self.rms_N > LOOSE * most:
             share = f"the residual RMS is {100.0 * self.rms_N / most:.0f} % of the largest"
             found.append(f"{channel(control, 'force')}: no rising curve fits the forces: {share}")
+        if self.zero_N:
+            problem = f"{self.zero_N:.3g} N are in it on both sides: a gauge's zero, or a trim?"
+            found.append(f"{channel(control, 'force')}: {problem} The curve is without them")
+        if self.straight:
+            problem = f"breakout: is right if the curve is straight up to {self.straight:.3g}"
+            found.append(f"{problem} {unit_of(control)}; give readings nearer to neutral")
         return found
 
     def at(self, deflection: Floats, row: int, motion: float) -> Floats:
@@ -101,7 +118,7 @@ class Feel:
         curve = np.interp(size, self.deflection, self.force[row])
         side = np.sign(deflection)
         return np.asarray(side * self.breakout_N + (side if odd else 1.0) * curve) + (
-            motion * self.friction_N
+            motion * self.friction_N + self.zero_N
         )
 
 
@@ -222,35 +239,63 @@ def fit_feel(sweep: Sweep) -> Feel:
     """Return breakout, friction and curve of a sweep."""
     used = sweep.far & (sweep.motion != 0.0)
     both = bool(np.any(sweep.deflection[used] > 0.0) and np.any(sweep.deflection[used] < 0.0))
-    found = [_Fit(sweep, used, odd) for odd in ((True, False) if both else (True,))]
-    best = min(found, key=lambda fit: fit.criterion)
+    kinds = (
+        [(True, False), (False, False), (True, True), (False, True)] if both else [(True, False)]
+    )
+    fits = [(_Fit(sweep, used, odd, zero), zero) for odd, zero in kinds]
+    best, _ = min(fits, key=lambda each: each[0].criterion + VERY_STRONG * each[1])
     return best.feel()
 
 
 class _Fit:
-    """The best nodes of a sweep, for one curve for both sides (`odd`), or for two."""
+    """The best nodes of a sweep.
 
-    def __init__(self, sweep: Sweep, used: NDArray[np.bool_], odd: bool) -> None:
+    The curve is one for both sides (`odd`), or two; the forces may have a zero error (`zero`).
+    """
+
+    def __init__(self, sweep: Sweep, used: NDArray[np.bool_], odd: bool, zero: bool) -> None:
         self._sweep, self._used, self._odd = sweep, used, odd
         self._pressures = np.unique(sweep.pressure)
         at = np.abs(sweep.deflection[used]) if odd else sweep.deflection[used]
         self._at, self._force = at, sweep.force[used]
+        pressure = sweep.pressure[used]
+        self._levels = [np.unique(at[pressure == q]) for q in self._pressures]
+        # F_BO and F_c, and F_0 as two of which one is 0
+        columns = [np.sign(sweep.deflection[used]), sweep.motion[used]]
+        columns += [np.ones_like(at), -np.ones_like(at)] if zero else []
+        self._constant = np.stack(columns, axis=1)
         ends = [end for end in (float(np.min(at)), float(np.max(at))) if end < 0.0 or end > 0.0]
         ends = ends[-1:] if odd else ends
-        inner = [end * k / GRID for end in ends for k in range(1, GRID)]
         self._step = max(map(abs, ends)) / GRID
         self._ends = frozenset(ends)
-        self._nodes = sorted({0.0, *inner, *ends})
+        self._nodes = sorted({0.0, *ends})
+        for node in (end * k / GRID for k in range(GRID - 1, 0, -1) for end in ends):
+            nodes = sorted([*self._nodes, node])
+            self._nodes = nodes if self._determined(nodes) else self._nodes
         self.criterion = self._try(self._nodes)
         self._remove()
         self._move()
+        while self._add():
+            self._move()
         self._remove()
 
+    def _determined(self, nodes: Sequence[float]) -> bool:
+        """Tell whether each segment holds a deflection, and each at neutral two, at every q̄.
+
+        From two deflections a straight line is extended to neutral, where it gives the breakout.
+        """
+        for at in self._levels:
+            for low, high in pairwise(nodes):
+                inside = (at > low) & (at <= high) if low >= 0.0 else (at >= low) & (at < high)
+                if np.count_nonzero(inside) < (2 if 0.0 in (low, high) else 1):
+                    return False
+        return True
+
     def _design(self, nodes: Sequence[float]) -> Floats:
-        """Return the derivatives of the readings by F_BO, F_c, and each rise at each q̄."""
+        """Return the derivatives of the readings by the constants, and each rise at each q̄."""
         sweep, used = self._sweep, self._used
         side = np.sign(sweep.deflection[used])
-        columns = [side, sweep.motion[used]]
+        columns = list(self._constant.T)
         zero = nodes.index(0.0)
         for k, (low, high) in enumerate(pairwise(nodes)):
             inside = np.clip((self._at - low) / (high - low), 0.0, 1.0)
@@ -267,11 +312,13 @@ class _Fit:
 
     def _try(self, nodes: Sequence[float]) -> float:
         """Return the Bayesian information criterion of some nodes."""
+        if not self._determined(nodes):
+            return np.inf
         values, residual = self._solve(nodes)
         count = len(residual)
         least = (EXACT * float(np.max(np.abs(self._force)))) ** 2
-        # A node that is not on the grid's ends is a parameter too.
-        free = len(values) + len(nodes) - 1 - len(self._ends)
+        # A node that is not on the grid's ends is a parameter too; F_0 is one, of two values.
+        free = len(values) + len(nodes) - 1 - len(self._ends) - (self._constant.shape[1] > 2)
         return float(
             count * np.log(np.mean(residual**2) + least) + min(free, count - 1) * np.log(count)
         )
@@ -293,6 +340,15 @@ class _Fit:
             while sum(self._moved(k, share * self._step) for k in range(len(self._nodes))):
                 pass
 
+    def _add(self) -> bool:
+        """Add the node in the middle of a segment with which the criterion is least, if lower."""
+        tried = [sorted([*self._nodes, 0.5 * (a + b)]) for a, b in pairwise(self._nodes)]
+        scores = [self._try(nodes) for nodes in tried]
+        if min(scores) >= self.criterion - 1e-9 * abs(self.criterion):
+            return False
+        self.criterion, self._nodes = min(scores), tried[int(np.argmin(scores))]
+        return True
+
     def _moved(self, k: int, by: float) -> bool:
         if self._nodes[k] == 0.0 or self._nodes[k] in self._ends:
             return False
@@ -306,24 +362,35 @@ class _Fit:
         return False
 
     def feel(self) -> Feel:
-        """Return the fit at these nodes."""
-        values, residual = self._solve(self._nodes)
-        design = self._design(self._nodes)
-        active = values > 0.0
-        freedom = max(len(residual) - int(np.count_nonzero(active)), 1)
-        variance = float(residual @ residual) / freedom
-        spread = np.zeros(len(values))
-        inverse = np.linalg.pinv(design[:, active].T @ design[:, active])
-        spread[active] = np.sqrt(variance * np.diag(inverse))
-        wide = float(student.ppf(0.975, freedom)) * spread
-        rises = values[2:].reshape(len(self._nodes) - 1, len(self._pressures)).T
+        """Return the fit: the constants with the segments at neutral divided, then the curve."""
         zero = self._nodes.index(0.0)
+        beside = self._nodes[max(zero - 1, 0) : zero] + self._nodes[zero + 1 : zero + 2]
+        finer = sorted([*self._nodes, *(0.5 * node for node in beside)])
+        straight = 0.0 if self._determined(finer) else max(map(abs, beside))
+        nodes = self._nodes if straight else finer
+        values, residual = self._solve(nodes)
+        design = self._design(nodes)
+        count = self._constant.shape[1]
+        active = values > 0.0
+        active[:2] = True
+        freedom = max(len(residual) - int(np.count_nonzero(active)), 1)
+        inverse = np.linalg.pinv(design[:, active].T @ design[:, active])
+        spread = np.sqrt(float(residual @ residual) / freedom * np.diag(inverse)[:2])
+        wide = float(student.ppf(0.975, freedom)) * spread
+        rest = self._force - self._constant @ values[:count]
+        curve = self._design(self._nodes)[:, count:]
+        steps, _ = nnls(curve, rest)
+        residual = rest - curve @ steps
+        freedom = max(len(residual) - int(np.count_nonzero(steps)) - count, 1)
+        rises = steps.reshape(len(self._nodes) - 1, len(self._pressures)).T
         force = np.concatenate((np.zeros((len(rises), 1)), np.cumsum(rises, axis=1)), axis=1)
         force -= force[:, [zero]]
         return Feel(
             *(float(values[0]), float(wide[0]), float(values[1]), float(wide[1])),
-            *(self._pressures, np.array(self._nodes), force, float(np.sqrt(variance))),
-            *(self._sweep, self._used),
+            *(self._pressures, np.array(self._nodes), force),
+            float(np.sqrt(residual @ residual / freedom)),
+            float(values[2] - values[3]) if count > 2 else 0.0,
+            *(straight, self._sweep, self._used),
         )
 
 

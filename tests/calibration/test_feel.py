@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from coupled.calibration.feel import (
     Feel,
+    Sweep,
     fit_feel,
     read_sweep,
     sweep_of_record,
@@ -343,3 +344,50 @@ def test_a_control_at_rest_is_no_sweep() -> None:
     still[:, 2] = 0.0
     with pytest.raises(InputError, match="never changes: the column is at rest"):
         swept_control(Record(both_sides().channels, still), Path("log.csv"))
+
+
+def curved_sweep(
+    seed: int, readings: int = 40, zero_N: float = 0.0, stop_N_per_m: float = 0.0
+) -> Sweep:
+    """Return a sweep of 0.15 m out and back on both sides: 5 N of breakout, 8 N of friction."""
+    a = np.linspace(0.0, 0.15, readings + 1)
+    at = np.concatenate([a, a[-2::-1], -a[1:], -a[-2::-1]])
+    motion = np.concatenate([np.ones(readings + 1), -np.ones(2 * readings), np.ones(readings)])
+    size = np.abs(at)
+    spring = 5.0 + 400.0 * size + 8000.0 * size**3 + stop_N_per_m * np.maximum(size - 0.14, 0.0)
+    noise = np.random.default_rng(seed).standard_normal(at.size)
+    force = np.sign(at) * spring + 8.0 * motion + zero_N + noise
+    turning = np.isin(at, [0.15, -0.15])
+    return Sweep(at, force, np.zeros(at.size), np.where(turning, 0.0, motion))
+
+
+def test_the_interval_of_a_breakout_contains_it_where_the_curve_bends() -> None:
+    """From the nodes that the criterion keeps, none of these four intervals contained it."""
+    found = [fit_feel(curved_sweep(seed)) for seed in (10, 13, 14, 17)]
+    within = [abs(each.breakout_N - 5.0) <= each.breakout_half_width_N for each in found]
+    assert all(within)
+    assert all(each.zero_N == each.straight == 0.0 for each in found)
+
+
+def test_a_gauge_that_is_not_zero_does_not_hide_the_breakout() -> None:
+    """The breakout was 0, and the curve had a step."""
+    found = fit_feel(curved_sweep(0, zero_N=6.0))
+    assert found.breakout_N == pytest.approx(5.0, abs=1.5)
+    assert found.zero_N == pytest.approx(6.0, abs=0.3)
+    (doubt,) = found.doubts("column")
+    assert "N are in it on both sides: a gauge's zero, or a trim?" in doubt
+
+
+def test_a_stop_at_the_end_of_a_sweep_does_not_hide_the_breakout() -> None:
+    """The breakout was 0.04 N, by 2 segments with a residual of 2.7 N."""
+    found = fit_feel(curved_sweep(0, stop_N_per_m=4e4))
+    assert found.rms_N < 1.3
+    assert found.breakout_N == pytest.approx(5.0, abs=1.5)
+
+
+def test_a_curve_has_no_more_nodes_than_its_readings_determine() -> None:
+    """From 12 readings at 3 deflections it had 22 segments, and 20.5 N of breakout."""
+    found = fit_feel(curved_sweep(0, readings=4))
+    assert len(found.deflection) <= 3
+    doubt = found.doubts("column")[-1]
+    assert doubt.startswith("breakout: is right if the curve is straight up to 0.")
