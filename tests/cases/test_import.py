@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+import polars as pl
 import pytest
 
 from coupled import InputError, import_log
@@ -343,3 +344,107 @@ def test_joints_that_change_places_are_read_by_name(tmp_path: Path, form: str) -
 def test_a_map_of_no_log_is_refused() -> None:
     with pytest.raises(InputError, match="import_log: log: is empty"):
         import_log([], "map.toml")
+
+
+def raw_counts(folder: Path, form: str) -> tuple[str, dict[str, np.ndarray]]:
+    """Write forces as counts of 0.1 N above −400 N, with that scaling in attributes of a tool."""
+    columns = pulled()
+    counts = np.round((columns["F"] + 400.0) / 0.1)
+    scaling = {"Gain": 0.1, "Offset": -400.0}
+    if form == "hdf5":
+        h5py = pytest.importorskip("h5py")
+        with h5py.File(folder / "log.h5", "w") as file:
+            file.update({**columns, "F": counts})
+            file["F"].attrs.update(scaling)
+            file["D"].attrs.update({"scale": 1.0, "offset": 0.0})
+        return "log.h5", columns
+    nptdms = pytest.importorskip("nptdms")
+    written = {**columns, "F": counts}
+    channels = [
+        nptdms.ChannelObject("g", name, values, scaling if name == "F" else {})
+        for name, values in written.items()
+    ]
+    with nptdms.TdmsWriter(str(folder / "log.tdms")) as writer:
+        writer.write_segment(channels)
+    return "log.tdms", columns
+
+
+@pytest.mark.parametrize("form", ["hdf5", "tdms"])
+def test_a_scaling_that_no_reader_applies_is_decided_in_the_map(tmp_path: Path, form: str) -> None:
+    log, columns = raw_counts(tmp_path, form)
+    mapped(tmp_path)
+    said = refused(tmp_path, log)
+    assert f"{log}: F: the file gives Gain = 0.1, Offset = -400" in said
+    assert "give channels.pedals_force_N.scale and offset" in said
+    mapped(tmp_path, F_more="scale = 0.1\noffset = -400.0\n")
+    force_N = imported(tmp_path, log)["pedals_force_N"]
+    np.testing.assert_allclose(force_N, columns["F"], atol=0.051)
+
+
+def test_numbers_outside_the_valid_range_of_netcdf_are_empty(tmp_path: Path) -> None:
+    h5py = pytest.importorskip("h5py")
+    columns = pulled()
+    counts = np.round(columns["F"] * 100.0).astype("i2")
+    counts[70:72] = 9999
+    with h5py.File(tmp_path / "log.h5", "w") as file:
+        file.update({**columns, "F": counts})
+        file["F"].attrs.update({"scale_factor": 0.01, "valid_range": np.array([-8000, 8000], "i2")})
+    mapped(tmp_path)
+    found = imported(tmp_path, "log.h5")["pedals_force_N"]
+    np.testing.assert_allclose(found, columns["F"], atol=0.02)
+
+
+@pytest.mark.parametrize(
+    ("force", "said"),
+    [
+        (np.ones((ROWS, 2)), "holds an array of 400 x 2 numbers, no vector"),
+        (1j * np.ones((ROWS, 1)), "holds complex numbers"),
+    ],
+)
+@pytest.mark.parametrize("form", ["mat", "h5"])
+def test_a_variable_that_is_no_vector_is_refused_by_its_kind(
+    tmp_path: Path, form: str, force: np.ndarray, said: str
+) -> None:
+    """The message was that the log has no such variable."""
+    columns = {**pulled(), "F": force}
+    if form == "mat":
+        scipy_io = pytest.importorskip("scipy.io")
+        scipy_io.savemat(tmp_path / "log.mat", columns)
+    else:
+        with pytest.importorskip("h5py").File(tmp_path / "log.h5", "w") as file:
+            file.update(columns)
+    mapped(tmp_path)
+    assert f"log.{form}: F: {said}" in refused(tmp_path, f"log.{form}")
+
+
+def test_a_true_among_numbers_is_no_number(tmp_path: Path) -> None:
+    each = zip(*pulled().values(), strict=True)
+    rows = [dict(zip(pulled(), map(float, row), strict=True)) for row in each]
+    rows[30]["F"] = True
+    (tmp_path / "log.json").write_text(json.dumps(rows))
+    mapped(tmp_path)
+    assert "log.json: F: row 31 holds 'true', which is no number" in refused(tmp_path, "log.json")
+
+
+def test_a_clock_of_unsigned_integers_beyond_those_with_a_sign_is_read(tmp_path: Path) -> None:
+    columns = pulled()
+    count = [2**63 + round(1e9 * t) for t in columns["t"].tolist()]
+    table = pl.DataFrame({**columns, "t": pl.Series(count, dtype=pl.UInt64)})
+    table.write_parquet(tmp_path / "log.parquet")
+    mapped(tmp_path, clock='unit = "ns"\n')
+    found = imported(tmp_path, "log.parquet")
+    np.testing.assert_allclose(found["time_s"], columns["t"], atol=1e-9)
+
+
+def test_days_without_a_year_include_the_29th_of_february(tmp_path: Path) -> None:
+    columns = pulled()
+    csv(tmp_path, columns)
+    head, *rows = (tmp_path / "log.csv").read_text().splitlines()
+    stamps = [
+        f"28/02 23:59:{59 + t:.3f}" if t < 1.0 else f"29/02 00:00:{t - 1.0:06.3f}"
+        for t in columns["t"].tolist()
+    ]
+    text = [f"{stamp},{row.partition(',')[2]}" for stamp, row in zip(stamps, rows, strict=True)]
+    (tmp_path / "log.csv").write_text("\n".join([head, *text]))
+    mapped(tmp_path, clock='date = "%d/%m %H:%M:%S.%f"\n')
+    assert len(imported(tmp_path, "log.csv")["time_s"]) == ROWS

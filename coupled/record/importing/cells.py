@@ -290,9 +290,10 @@ def continued(clock_us: pl.Series) -> pl.Series:
 
 def _moment(text: str, pattern: str) -> datetime | time:
     if pattern != ISO:
-        found = datetime.strptime(_FINER.sub("", text), pattern)
+        text = _FINER.sub("", text)
         if "%Y" not in pattern and "%y" not in pattern:
-            return found.time()
+            return datetime.strptime(f"2000 {text}", f"%Y {pattern}").time()  # has a 29 February
+        found = datetime.strptime(text, pattern)
     elif "-" not in text and ":" in text:
         return time.fromisoformat(text)
     else:

@@ -136,6 +136,11 @@ def _in_si(log: Log, name: str, channel: Channel, map_file: Path, warnings: list
     """Return a channel at the log's rows, in the unit of its name."""
     key = f"channels.{name}"
     values = log.values(channel, map_file, key)
+    scaling = log.unscaled.get(channel.source)
+    if scaling and not channel.model_fields_set & {"scale", "offset"}:
+        problem = f"the file gives {scaling}, and whether its numbers still need that is not known:"
+        problem += f" give {key}.scale and offset; scale = 1 where they are physical"
+        raise InputError(log.file, channel.source, problem)
     stated = log.units.get(channel.source, "")
     if not channel.own and not channel.unit and not stated:
         raise InputError(map_file, f"{key}.unit", "is missing; the log states none")

@@ -123,7 +123,8 @@ def _named_apart(cells: list[tuple[str, Any]]) -> dict[str, Any]:
 def _column(name: str, cells: Sequence[Any]) -> pl.Series:
     """Return cells as a column: of numbers, of lists of numbers, else of text."""
     given = [cell for cell in cells if cell is not None]
-    if all(isinstance(cell, (int, float)) for cell in given):
+    switches = {isinstance(cell, bool) for cell in given}  # among numbers they are no numbers
+    if len(switches) < 2 and all(isinstance(cell, (int, float)) for cell in given):
         whole = all(isinstance(cell, int) and abs(cell) < 2**63 for cell in given)
         if whole and given:
             return pl.Series(name, cells, dtype=pl.Int64, strict=False)

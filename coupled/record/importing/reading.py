@@ -53,10 +53,11 @@ class Log:
     """A log's columns, as in the file. `lines` has the line of each row of a CSV.
 
     If a format samples groups of columns by clocks of their own, `stamps` names each one's column
-    of times, and `groups` the group; `refused` is the reason why a column is not read. `part` is
-    the group of a log that is a part of another. Columns of one name are called `name#1`,
-    `name#2`, …, and `doubled` has {name: those}. `decimal` is the mark in numbers that are text.
-    `notes` are lines for the user: warnings of the reader's library, rows left out.
+    of times, and `groups` the group; `refused` is the reason why a column is not read, `unscaled` a
+    scaling in the file that is not applied. `part` is the group of a log that is a part of another.
+    Columns of one name are called `name#1`, `name#2`, …, and `doubled` has {name: those}. `decimal`
+    is the mark in numbers that are text. `notes` are lines for the user: warnings of the reader's
+    library, rows left out.
     """
 
     file: Path
@@ -67,6 +68,7 @@ class Log:
     groups: Mapping[str, str] = field(default_factory=dict)
     stamps: Mapping[str, str] = field(default_factory=dict)
     refused: Mapping[str, str] = field(default_factory=dict)
+    unscaled: Mapping[str, str] = field(default_factory=dict)
     part: str = ""
     decimal: Literal[".", ","] = "."
     notes: tuple[str, ...] = ()
@@ -88,7 +90,7 @@ class Log:
             raise InputError(self.file, name, self.refused[name])
         if name not in self.columns:
             hint = nearest(name, self.columns)
-            if len(self.columns) == 1:
+            if len(self.columns) == 1 and self.lines is not None:
                 hint = f"its only column is {next(iter(self.columns))!r}: another log.delimiter?"
             raise InputError(map_file, key, f"{self.file.name} has no {name!r}; {hint}")
         return self.columns[name]
@@ -149,8 +151,8 @@ class Log:
         factor = known_unit(unit, map_file, f"{key}.unit").factor
         exact = Fraction(factor).limit_denominator(10**12)  # 1/1000, not the double next to it
         if column.dtype.is_integer() and column.len() and column[0] is not None:
-            wide = column.cast(pl.Int64, strict=False) - int(column[0])
-            steps = wide.cast(pl.Float64).to_numpy().astype(np.float64)
+            whole = column.cast(pl.Int128)
+            steps = (whole - whole.head(1)).cast(pl.Float64).to_numpy().astype(np.float64)
             steps = self._unwrapped(steps, clock, map_file, key)
             return Stamps(Fraction(int(column[0])) * exact, steps * factor)
         first = float(values[0]) if values.size and np.isfinite(values[0]) else 0.0
@@ -227,6 +229,7 @@ def _log(path: Path, found: list[Found]) -> Log:
         groups={c.name: c.group for c in found if c.group},
         stamps={c.name: c.stamps for c in found if c.stamps},
         refused={c.name: c.refused for c in found if c.refused},
+        unscaled={c.name: c.unscaled for c in found if c.unscaled},
     )
 
 

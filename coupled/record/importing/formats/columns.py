@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -12,12 +13,19 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from coupled.errors import InputError
+from coupled.errors import InputError, shown
 
 Numbers = NDArray[np.float64] | NDArray[np.int64]
 MOST_COLUMNS = 20_000
 TIMES = ("time", "t", "timestamp")  # names of a struct's stamps
-WORDS = ("name", "unit", "group", "stamps", "refused")
+TEXT = "holds text or objects, no numbers"
+WORDS = ("name", "unit", "group", "stamps", "refused", "unscaled")
+# Words in the names of attributes that scale numbers, and the value that changes nothing: of NWB
+# (conversion, offset), HDF4 (scale, slope, intercept), netCDF (scale_factor) and LabVIEW (gain).
+SCALING = {
+    **dict.fromkeys(("scale", "gain", "conversion", "slope"), 1.0),
+    **dict.fromkeys(("offset", "intercept"), 0.0),
+}
 
 
 @dataclass(frozen=True)
@@ -26,7 +34,7 @@ class Found:
 
     `unit` is that of the file, or "". Columns of one `group` were sampled together, at the times in
     the column `stamps`; both are "" if the file does not give them. `refused` is the reason why an
-    existing column is not read.
+    existing column is not read, `unscaled` a scaling that the file gives and that is not applied.
     """
 
     name: str
@@ -35,6 +43,21 @@ class Found:
     group: str = ""
     stamps: str = ""
     refused: str = ""
+    unscaled: str = ""
+
+
+def scaling_in(attributes: Mapping[str, Any], applied: Sequence[str] = ()) -> str:
+    """Return the attributes of a column that scale it, as text, except for those `applied`."""
+    found = []
+    for name, value in attributes.items():
+        words = re.findall("[A-Z]?[a-z]+|[A-Z]+", str(name))
+        neutral = next((SCALING[w.lower()] for w in words if w.lower() in SCALING), None)
+        number = np.ravel(np.asarray(value))
+        if neutral is None or name in applied or number.dtype.kind not in "iuf":
+            continue
+        if number.size and not np.all(number == neutral):
+            found.append(f"{name} = {', '.join(f'{each:.6g}' for each in number[:3])}")
+    return shown(", ".join(found), 80)
 
 
 def as_numbers(values: object) -> Numbers | None:
@@ -69,6 +92,19 @@ def columns_of_matrix(
     return {word: table[:, i].astype(np.float64) for i, word in enumerate(words)}
 
 
+def unread(name: str, values: Any) -> Found | None:
+    """Return the refused column of an array that is no vector of real numbers; None of one cell."""
+    if np.size(values) < 2:
+        return None
+    why = TEXT
+    if values.dtype.kind == "c":
+        why = "holds complex numbers; save their parts"
+    elif values.dtype.kind in "biuf":
+        why = f"holds an array of {' x '.join(map(str, np.shape(values)))} numbers, no vector; of a"
+        why += " matrix, log.matrix reads the columns"
+    return Found(name, np.zeros(0), refused=why)
+
+
 def by_their_groups(columns: Sequence[Found]) -> list[Found]:
     """Return columns named `group.name` if two groups have one of the name, else `name`."""
     times = Counter(column.name for column in columns)
@@ -94,7 +130,7 @@ def by_their_times(columns: Sequence[Found]) -> list[Found]:
     times: dict[str, Found] = {}
     for column in columns:
         struct, _, field = column.name.rpartition(".")
-        if field.casefold() in TIMES and np.all(np.diff(column.values) >= 0):
+        if field.casefold() in TIMES and column.values.size and np.all(np.diff(column.values) >= 0):
             times.setdefault(struct, column)
     owners = [_struct_with_time(column, times) for column in columns]
     used = [times[struct].values for struct in times if struct in owners]

@@ -24,8 +24,10 @@ from coupled.record.importing.formats.columns import (
     as_numbers,
     by_their_times,
     columns_of_matrix,
+    scaling_in,
+    unread,
 )
-from coupled.record.importing.formats.objects import refused_object, replace_objects
+from coupled.record.importing.formats.objects import MARK, refused_object, replace_objects
 
 DEEPEST = 6  # groups within groups
 MOST_VALUES = 200_000_000  # of one data set; a small file can declare any size
@@ -41,7 +43,7 @@ def read_hdf5(path: Path, content: bytes, matrix: str, names: list[str] | str) -
     found: dict[str, Found] = {}
     with h5py.File(io.BytesIO(content), "r") as file:
         _walk(found, file, file, "", 0)
-        objects = [name for name, column in found.items() if column.refused]
+        objects = [name for name, column in found.items() if column.refused.startswith(MARK)]
         variables = list(dict.fromkeys(re.split(r"[.(]", name)[0] for name in objects))
         whole = not objects or _holds_all(file)
         if matrix:
@@ -54,7 +56,7 @@ def read_hdf5(path: Path, content: bytes, matrix: str, names: list[str] | str) -
             found.update({name: Found(name, column) for name, column in columns.items()})
     if objects and whole:
         replace_objects(found, content, variables)
-    if not found:
+    if not objects and all(column.refused for column in found.values()):
         raise InputError(path, "", "holds no vector of numbers")
     return by_their_times(list(found.values()))
 
@@ -116,26 +118,37 @@ def _take(found: dict[str, Found], file: Any, item: Any, name: str, depth: int) 
             if reference and depth <= DEEPEST and len(found) < MOST_COLUMNS:
                 _take(found, file, file[reference], f"{array}({place + 1}).{field}", depth + 1)
         return
-    if _text(item) or item.dtype.kind not in "biufV":
-        return
     values = _array(item)
     if values is None:
         return
+    if _text(item) or item.dtype.kind not in "biufV":
+        column = None if _text(item) else unread(name, values)
+        found.update({} if column is None else {name: column})
+        return
     unit = _unit(item.attrs)
+    applied = [
+        key for key in ("scale_factor", "add_offset") if _number(item.attrs, key) is not None
+    ]
+    scaling = scaling_in(item.attrs, applied)
     values = _unpacked(values, item.attrs)
     if values.dtype.names:
         for field in values.dtype.names:
-            _keep(found, f"{name}.{field}", values[field], "")
+            _keep(found, f"{name}.{field}", values[field])
     else:
-        _keep(found, name, values, unit)
+        _keep(found, name, values, unit, scaling)
 
 
-def _keep(found: dict[str, Found], name: str, values: Any, unit: str) -> None:
+def _keep(
+    found: dict[str, Found], name: str, values: Any, unit: str = "", scaling: str = ""
+) -> None:
     if values.ndim == 2 and 1 in values.shape:
         values = values.reshape(-1)
     column: Numbers | None = as_numbers(values)
-    if column is not None and column.size > 1:
-        found[name] = Found(name, column, unit)
+    if column is None:
+        refused = unread(name, values)
+        found.update({} if refused is None else {name: refused})
+    elif column.size > 1:
+        found[name] = Found(name, column, unit, unscaled=scaling)
 
 
 def _array(item: Any) -> Any:
@@ -170,9 +183,15 @@ def _unpacked(values: Any, attributes: Mapping[str, Any]) -> Any:
     """Return physical values of data packed by netCDF's conventions."""
     scale, offset = _number(attributes, "scale_factor"), _number(attributes, "add_offset")
     empty = [_number(attributes, key) for key in ("_FillValue", "missing_value")]
-    if values.dtype.kind not in "iuf" or {scale, offset, *empty} == {None}:
+    if values.dtype.kind not in "iuf":
         return values
     lacking = np.isin(values, [each for each in empty if each is not None])
+    low, high = (_number(attributes, key) for key in ("valid_min", "valid_max"))
+    span = np.ravel(attributes.get("valid_range", []))
+    low, high = span if span.size == 2 and span.dtype.kind in "iuf" else (low, high)
+    lacking |= (values < (-np.inf if low is None else low)) | (
+        values > (np.inf if high is None else high)
+    )
     if scale is None and offset is None and not lacking.any():
         return values
     physical = values * (1.0 if scale is None else scale) + (offset or 0.0)

@@ -13,14 +13,16 @@ from typing import Any
 import numpy as np
 from scipy import io as scipy_io
 from scipy.io.matlab import MatlabOpaque, varmats_from_mat
+from scipy.sparse import issparse
 
 from coupled.errors import InputError
 from coupled.record.importing.formats.columns import (
     Found,
     by_their_times,
     columns_of_matrix,
+    unread,
 )
-from coupled.record.importing.formats.objects import refused_object, replace_objects
+from coupled.record.importing.formats.objects import MARK, refused_object, replace_objects
 
 DEEPEST = 6  # structs within structs
 MOST_FIELDS = 10_000
@@ -36,9 +38,9 @@ def read_matlab(path: Path, content: bytes, matrix: str, names: list[str] | str)
     found: dict[str, Found] = {}
     objects = []
     for name, value in variables.items():
-        before = {each for each, column in found.items() if column.refused}
+        before = _objects(found)
         _collect(found, name, value, 0)
-        if {each for each, column in found.items() if column.refused} - before:
+        if _objects(found) - before:
             objects.append(name)
     if objects:
         replace_objects(found, content, objects)
@@ -46,9 +48,13 @@ def read_matlab(path: Path, content: bytes, matrix: str, names: list[str] | str)
         words = names if isinstance(names, list) else _words(variables.get(names))
         columns = columns_of_matrix(path, matrix, variables.get(matrix), names, words)
         found.update({name: Found(name, values) for name, values in columns.items()})
-    if not found:
+    if not objects and all(column.refused for column in found.values()):
         raise InputError(path, "", "holds no vector of numbers")
     return by_their_times(list(found.values()))
+
+
+def _objects(found: dict[str, Found]) -> set[str]:
+    return {name for name, column in found.items() if column.refused.startswith(MARK)}
 
 
 def _load(path: Path, content: bytes) -> dict[str, Any]:
@@ -102,7 +108,11 @@ def _field(value: MatlabOpaque, *fields: str) -> str:
 
 def _collect(found: dict[str, Found], name: str, value: Any, depth: int) -> None:
     """Add to `found` the vectors in a variable, field by field."""
-    if not isinstance(value, np.ndarray) or depth > DEEPEST or len(found) >= MOST_FIELDS:
+    if depth > DEEPEST or len(found) >= MOST_FIELDS:
+        return
+    if issparse(value):
+        found[name] = Found(name, np.zeros(0), refused="is a sparse matrix; save it in full")
+    if not isinstance(value, np.ndarray):
         return
     if isinstance(value, MatlabOpaque):
         found[name] = refused_object(name, _field(value, "s2", "_Class"))
@@ -113,6 +123,8 @@ def _collect(found: dict[str, Found], name: str, value: Any, depth: int) -> None
                 _collect(found, f"{own}.{field}", element[field], depth + 1)
     elif value.dtype.kind in "biuf" and value.ndim == 2 and 1 in value.shape and value.size > 1:
         found[name] = Found(name, value.reshape(-1).astype(np.float64))
+    elif (refused := unread(name, value)) is not None:
+        found[name] = refused
 
 
 def _words(value: Any) -> list[str]:

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from coupled.record.importing.formats.columns import MOST_COLUMNS, Found, as_numbers
+from coupled.record.importing.formats.columns import MOST_COLUMNS, TEXT, Found, as_numbers
 
 DEEPEST = 6  # structs within structs
 
@@ -104,7 +104,7 @@ def _table(found: dict[str, Found], name: str, table: Any) -> None:
             found[own] = Found(own, _ns(column), "ns", group, stamps)
             continue
         values = as_numbers(column)
-        refused = "" if values is not None else "holds text or objects, no numbers"
+        refused = "" if values is not None else TEXT
         kept = np.zeros(0) if values is None else values
         unit = str(units[place]).strip()[:40]
         found[own] = Found(own, kept, unit, group, stamps, refused)

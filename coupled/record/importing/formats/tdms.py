@@ -12,10 +12,12 @@ from nptdms import TdmsFile
 from coupled.errors import InputError
 from coupled.record.importing.formats.columns import (
     MOST_COLUMNS,
+    TEXT,
     Found,
     Numbers,
     as_numbers,
     by_their_groups,
+    scaling_in,
 )
 from coupled.record.importing.formats.warned import kept_warnings
 
@@ -43,6 +45,7 @@ def read_tdms(path: Path, content: bytes) -> list[Found]:
                 values = np.zeros(0)
                 notes.append(f"its scale cannot be computed ({type(error).__name__})")
         if values is None:
+            columns.append(Found(str(channel.name), np.zeros(0), refused=TEXT))
             continue
         label, stamps = str(channel.group_name), ""
         time_s = _waveform(channel, len(values), min(starts, default=None))
@@ -56,8 +59,12 @@ def read_tdms(path: Path, content: bytes) -> list[Found]:
         unit = own or str(channel.properties.get("unit_string", "")).strip()[:40]
         refused = f"npTDMS does not know what its numbers are: {notes[0]}" if notes else ""
         values = values[:0] if refused else values
-        columns.append(Found(str(channel.name), values, unit, _own(label, stamps), stamps, refused))
-    if not columns:
+        own_scaling = scaling_in(
+            {k: v for k, v in channel.properties.items() if not k.startswith(("NI_", "wf_"))}
+        )
+        name, group = str(channel.name), _own(label, stamps)
+        columns.append(Found(name, values, unit, group, stamps, refused, own_scaling))
+    if all(column.refused == TEXT for column in columns):
         raise InputError(path, "", "holds no channel of numbers")
     return by_their_groups(columns)
 

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from coupled.errors import InputError
 from coupled.record.channels import CONTROL_NAMES
 from coupled.record.channels import channel as channel_name
+from coupled.record.importing.formats.columns import TEXT
 from coupled.record.importing.mapping import CHANNELS, Layout, own_unit
 from coupled.record.importing.plausible import move_oppositely
 from coupled.record.importing.reading import Log, read_log
@@ -98,7 +99,8 @@ def propose(files: Sequence[Path], rig: Rig | None = None) -> Proposal:
         if value == "?"
     )
     warnings = [note for log in read for note in log.notes]
-    warnings += [f"{name}: {why}" for log in read for name, why in log.refused.items()]
+    refused = [each for log in read for each in log.refused.items()]
+    warnings += [f"{name}: {why}" for name, why in refused if why != TEXT]
     text = _text(sections, logs, unmapped)
     return Proposal(text, questions, mapped, unmapped, tuple(dict.fromkeys(warnings)))
 
