@@ -17,7 +17,7 @@ from coupled.calibration.estimate import Instruments, usual_instruments
 from coupled.calibration.fit import condition, normal_equations, ordinary
 from coupled.calibration.readings import Readings
 from coupled.calibration.readingsfile import read_readings
-from coupled.calibration.refuse import refuse_poor
+from coupled.calibration.refuse import find_unit_doubts, refuse_poor
 from coupled.calibration.result import CalibrationResult
 from coupled.calibration.suspects import find_suspects
 from coupled.errors import InputError, nearest
@@ -135,6 +135,7 @@ def calibrate_control(
         level,
         angles,
         tuple(stale(control)),
+        tuple(find_unit_doubts(used, control, name)),
     )
 
 

@@ -11,6 +11,7 @@ from coupled.calibration.estimate import Instruments
 from coupled.calibration.readings import Readings
 from coupled.errors import InputError
 from coupled.record.channels import unit_of
+from coupled.record.importing.plausible import unit_doubt
 from coupled.rig.parameters import Control
 
 FEWEST = 4  # readings: two unknowns, and degrees of freedom for their errors
@@ -103,6 +104,29 @@ def _gradients_differ(readings: Readings, instruments: Instruments) -> bool:
     variance += (1e-7 * np.max(np.abs(force))) ** 2
     excess = float(np.sum((force - slope * deflection) ** 2 / variance))
     return excess > float(chdtri(len(force) - 1, 1.0 - SURELY))
+
+
+def find_unit_doubts(readings: Readings, control: Control, name: str) -> list[str]:
+    """Return the doubt about a unit if all gradients F/δ are outside those of the rig's schedule.
+
+    K is in proportion to δ/F: readings in another unit than stated give it wrong by the ratio.
+    """
+    size = np.abs(readings.deflection)
+    far = size > FAR * np.max(size)
+    found = readings.force[far] / readings.deflection[far]
+    filed = np.array(control.schedule.gradients)
+    ends = float(np.min(found)), float(np.max(found))
+    if min(*ends, float(np.min(filed))) <= 0.0:
+        return []
+    if ends[1] >= np.min(filed) and ends[0] <= np.max(filed):
+        return []
+    ratio = float(np.sqrt(ends[0] * ends[1] / (np.min(filed) * np.max(filed))))
+    doubt = unit_doubt(ratio, unit_of(name) == "rad")
+    if doubt is None:
+        return []
+    span = f"{ends[0]:.4g} to {ends[1]:.4g} N/{unit_of(name)}"
+    problem = f"F/deflection is {span}, the rig's gradients {np.min(filed):.4g}"
+    return [f"{problem} to {np.max(filed):.4g}: the force {doubt}"]
 
 
 def _separating(control: Control, slope: float, strongest: float, d: str) -> str:

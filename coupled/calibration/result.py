@@ -29,7 +29,7 @@ class CalibrationResult(Result):
     normal equations. `s3_mean` is eq. (13), `s2` has each method for S₂. `accuracy` are the errors
     of deflection and felt gradient, None if no compensation exists. `one_sided`: nulls from one
     side only, on a control with friction. `readings` are those used, along the arc; `level` are the
-    level readings if they were corrected, else None.
+    level readings if they were corrected, else None. `doubts` are about the units of the readings.
     """
 
     control: str
@@ -46,6 +46,7 @@ class CalibrationResult(Result):
     level: Floats | None
     angle_rad: Floats | None
     changed: tuple[str, ...]
+    doubts: tuple[str, ...]
 
     def __repr__(self) -> str:
         d, bend = unit_of(self.control), self.line.bend
@@ -117,4 +118,5 @@ class CalibrationResult(Result):
         table["rows_beyond_14_deg"] = self.beyond
         table["corrected_to_the_arc"] = self.level is not None
         table["stale"] = list(self.changed)
+        table["doubts"] = list(self.doubts)
         return table

@@ -13,13 +13,25 @@ from coupled.calibration.assumed import assumed_scales, real_scales, stale
 from coupled.calibration.calibrate import calibrate_control
 from coupled.calibration.calibrated import with_calibration
 from coupled.calibration.estimate import perfect_instruments, usual_instruments
+from coupled.calibration.figures import remarks
 from coupled.calibration.readings import Readings
 from coupled.calibration.readingsfile import read_readings
 from coupled.errors import InputError
 from coupled.rig.parameters import Control
 from coupled.rig.rigfile import read_rig
 from coupled.rig.rigwrite import rig_text
-from tests.support.readings import S1, K, column, csv_file, grid, readings, report_rig, with_errors
+from coupled.units import POUND_N
+from tests.support.readings import (
+    S1,
+    S3,
+    K,
+    column,
+    csv_file,
+    grid,
+    readings,
+    report_rig,
+    with_errors,
+)
 
 USUAL = usual_instruments("column")
 
@@ -41,6 +53,19 @@ def test_typed_readings_give_k_in_inches_a_pound(tmp_path: Path) -> None:
     assert found.line.bend.value == pytest.approx(K, rel=0.01)
     assert found.line.s1.value == pytest.approx(14.286 / 0.0254, rel=1e-3)
     assert found.s2["the null, eq. (14)"].value == pytest.approx(0.96 * found.s3.value)
+
+
+@pytest.mark.parametrize(
+    ("length", "force", "said"),
+    [(1.0, 1.0, ""), (1.0, 1.0 / POUND_N, "looks like pounds"), (0.1, 1.0, "another unit")],
+)
+def test_readings_in_another_unit_are_doubtful(length: float, force: float, said: str) -> None:
+    """K was wrong by the ratio of the units, with a narrow interval and without a remark."""
+    delta, pull = grid()
+    v1 = S1 * (delta - K * pull)
+    found = fit(readings(length * delta, force * pull, v1, S3 * pull))
+    remark = " ".join(line for line in remarks(found) if line.startswith("doubtful unit"))
+    assert said in remark if said else not remark
 
 
 @pytest.mark.parametrize("labels", ["one", "several"])
