@@ -14,6 +14,7 @@ import coupled
 from coupled.errors import InputError
 from coupled.gap.checks import check_record, clipped, not_measured
 from coupled.gap.diagnose import diagnose
+from coupled.gap.signals.live import live_of
 from coupled.record.channels import ControlName
 from coupled.record.importing.plausible import drives_the_hand, held
 from coupled.record.record import Record
@@ -127,6 +128,38 @@ def test_a_reading_that_repeats_for_another_reason_is_not_named() -> None:
         np.full(100, 3.0),
     ):
         assert held(signal) == ""
+
+
+def filled(record: Record, lost: NDArray[np.bool_]) -> Record:
+    """Return a record whose recorder fills lost rows with the last row."""
+    fresh = np.where(lost, 0, np.arange(len(record)))
+    data = record.data[np.maximum.accumulate(fresh)]
+    data[:, 0] = record.data[:, 0]
+    return replace(record, data=data)
+
+
+def test_rows_that_a_recorder_filled_with_the_last_row_are_no_readings(tmp_path: Path) -> None:
+    """Digital multiplier and viscous damping at 0.89 were the answer for a healthy machine."""
+    rig = nominal_rig(False)
+    lost = np.random.default_rng(3).random(5000) < 0.02
+    lost[:100] = False
+    lost[300:308] = True  # longer than what is interpolated
+    for given, names in (({}, []), ({"backlash": {"play_{d}": 1e-3}}, ["backlash"])):
+        record = made(tmp_path, rig, given, 5)
+        found = diagnose(rig, {"r": filled(record, lost[: len(record)])})
+        assert [one.name for one in found.effects] == names
+        assert max(stage.left or 0.0 for stage in found.stages) < 1.2
+        assert "samples are missing" in found.summary
+
+
+def test_rows_that_repeat_for_another_reason_are_readings() -> None:
+    plain = moved(0.2).data
+    coarse, slow = plain.copy(), plain[np.arange(1200) // 2 * 2]
+    coarse[:, 1:] = np.round(plain[:, 1:], 4)
+    smooth = np.column_stack([TIME_s, *3 * [np.clip(np.sin(TIME_s), 0.0, 1.0)]])
+    for data in (plain, coarse, slow, smooth):
+        data[:, 0] = TIME_s
+        assert live_of(Record(NAMES, data)) is None
 
 
 def test_an_encoder_at_rest_in_an_interpolated_log_is_not_named() -> None:

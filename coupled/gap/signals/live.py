@@ -6,6 +6,9 @@ signals are therefore resampled to equal steps of that clock. Short gaps are int
 long gaps are left out. Rows with faded forces, and rows with other hardware than at the start, are
 left out too. After a gap a replay restarts from the measured state.
 
+Other recorders fill a dropout with the last row. A row that repeats all readings of the controls,
+whose noise cannot repeat by chance, is therefore no new sample of any record.
+
 K̂ and the corrections may change in flight, by a switch or by adaptation in service. The manifest
 lists the changes (`live.switched`, `live.adapted`), and the host's equations are replayed with the
 values in use at each row.
@@ -13,6 +16,7 @@ values in use at each row.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -28,8 +32,10 @@ from scipy.ndimage import median_filter
 from coupled.errors import InputError
 from coupled.gap.signals.output import Floats
 from coupled.gap.thresholds import (
+    MINOR,
     MOST,
     NEGLIGIBLE,
+    PARTLY,
     TINY,
     BRIDGED_s,
     BRIEF_s,
@@ -42,6 +48,7 @@ from coupled.gap.thresholds import (
 from coupled.record.channels import (
     CONTROL_NAMES,
     FADED,
+    FRESH,
     LOADER_TIME,
     LOST,
     REPEATED,
@@ -50,6 +57,7 @@ from coupled.record.channels import (
     channel,
     unit_of,
 )
+from coupled.record.importing.plausible import chance_of_repeats
 from coupled.record.record import Record
 
 Mask = NDArray[np.bool_]
@@ -75,6 +83,7 @@ class Live:
 
     judged    rows in which stages of the loader are judged
     starts    rows at which their replays restart from the measured state
+    sampled   rows with a new sample of the loader
     quiet     the longest stretch of samples, from which noise is estimated
     signals   the channels measured by the loader, at equal steps of its clock
     assumed   K̂ in use, by control; only for controls whose K̂ changed
@@ -83,6 +92,7 @@ class Live:
 
     judged: Mask
     starts: Mask
+    sampled: Mask
     quiet: slice
     signals: Mapping[str, Floats] = field(default_factory=dict)
     assumed: Mapping[str, Assumed] = field(default_factory=dict)
@@ -90,7 +100,7 @@ class Live:
 
 
 def live_of(record: Record) -> Live | None:
-    """Return the parts of a live record that can be judged; None for other records.
+    """Return the parts of a record that can be judged; None if it is not live and lacks no sample.
 
     Raises InputError if the manifest is damaged.
     """
@@ -118,7 +128,7 @@ def live_of(record: Record) -> Live | None:
         _runs(received, clock.jumps), key=lambda run: run.stop - run.start, default=slice(0)
     )
     words = _words(frame_s, sampled, bridged, validity, other, clock, assumed)
-    return Live(judged, starts, quiet, signals, assumed, tuple(words))
+    return Live(judged, starts, sampled, quiet, signals, assumed, tuple(words))
 
 
 def judged_part(record: Record, file: object) -> Record:
@@ -144,12 +154,16 @@ def judged_part(record: Record, file: object) -> Record:
 
 
 def _validity(record: Record, live: Mapping[str, Any]) -> Floats | None:
-    """Return each row's validity; without that channel, from the spells without an answer."""
+    """Return each row's validity; without that channel, from the spells without an answer.
+
+    Without either, rows that repeat the row before have no new sample. None if there are none.
+    """
     if VALIDITY in record:
         return record[VALIDITY]
     spells = live.get("spells") or []
     if not spells:
-        return None
+        repeated = _repeated(record)
+        return np.where(repeated, float(REPEATED), FRESH) if repeated.any() else None
     found = np.zeros(len(record))
     for spell in spells:
         try:
@@ -158,6 +172,22 @@ def _validity(record: Record, live: Mapping[str, Any]) -> Floats | None:
             found[(record.time_s >= float(begun)) & (record.time_s < later)] = LOST
         except (TypeError, ValueError):
             raise _damaged("spells") from None
+    return found
+
+
+def _repeated(record: Record) -> Mask:
+    """Return the rows that repeat all readings of the row before, as a filled dropout does.
+
+    None if the noise of the readings may repeat by chance, or if the log is slower than its rows.
+    """
+    present = [channel(control, q) for control in CONTROL_NAMES for q in MEASURED]
+    readings = [record[name] for name in present if name in record]
+    found = np.zeros(len(record), dtype=bool)
+    if readings:
+        found[1:] = np.all(np.diff(readings) == 0.0, axis=0)
+    if found.any():
+        by_chance = len(record) * math.prod(map(chance_of_repeats, readings))
+        found &= by_chance < MINOR and float(np.mean(found)) < PARTLY
     return found
 
 

@@ -351,6 +351,8 @@ class Reader(Reading):
         judged = ~(near & ((jump > FAR_SIGMAS * own.rms) | (jump > 2.0 * rise)))
         if self.judged is not None:
             judged &= self.judged
+        if self.live is not None:  # a row without a new sample holds the product of the row before
+            judged &= self.live.sampled
         likely = _with_motion(computed, smooth, level)
 
         def predict(rig: Rig, seen: Floats = likely) -> Floats:

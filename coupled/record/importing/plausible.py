@@ -129,10 +129,8 @@ def held(values: Floats, most_rows: float = math.inf) -> str:
     steps = regular and float(np.median(np.abs(change[moved]))) > coarse
     if steps and 2.0 <= every <= most_rows:
         return f"holds each value over {every:g} rows"
-    noise = noise_level(values)
-    if noise <= max(coarse, ROUNDING * float(np.ptp(values))):
-        return ""
-    if noise_level(values, 6) < 0.5 * noise:
+    noise = _seen_noise(values)
+    if noise <= coarse:
         return ""
     still = (change == 0.0) & ~np.isin(values[1:], (values.max(), values.min()))
     jumps = np.abs(np.concatenate(([0.0], change, [0.0]))) > JUMP * noise
@@ -143,6 +141,25 @@ def held(values: Floats, most_rows: float = math.inf) -> str:
     k = int(np.argmax(lengths * stuck))
     rows = f"rows {begins[k] + 2} to {begins[k] + lengths[k] + 2}"
     return f"stands still at {values[begins[k]]:.4g} over {rows}"
+
+
+def chance_of_repeats(values: Floats) -> float:
+    """Return the probability that a row of a channel repeats the row before by chance.
+
+    Of white noise far above a resolution it is the resolution over 2·√π standard deviations. It is
+    1 without noise, since a channel at rest then repeats its value.
+    """
+    noise, levels = _seen_noise(values), np.unique(values)
+    if noise == 0.0 or levels.size < 2:
+        return 1.0
+    return min(1.0, float(np.diff(levels).min()) / (2.0 * math.sqrt(math.pi) * noise))
+
+
+def _seen_noise(values: Floats) -> float:
+    """Return a channel's noise; 0 below rounding, or if orders of differences do not agree."""
+    noise = noise_level(values)
+    seen = noise > ROUNDING * float(np.ptp(values)) and noise_level(values, 6) >= 0.5 * noise
+    return noise if seen else 0.0
 
 
 def _runs(true: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
