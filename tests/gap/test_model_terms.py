@@ -97,6 +97,23 @@ def test_a_wrong_function_is_named_with_its_property(cessna: Rig, worn: Record) 
     assert found.fit.rig.flight.terms == {CLP: pytest.approx(0.702, abs=0.01)}
 
 
+@pytest.mark.parametrize("name", [CLP, "mass"])
+def test_within_the_noise_only_a_function_of_the_model_is_named(name: str) -> None:
+    """It is tried there since a user asks for it; another effect is not."""
+    shape, noise = np.random.default_rng(9).normal(size=(2, 3000))
+
+    def predict(rig: Rig) -> NDArray[np.float64]:
+        assert rig.flight is not None
+        size = rig.flight.mass if name == "mass" else rig.flight.terms.get(CLP, 1.0)
+        return np.asarray(2.0 * (size - 1.0) * shape)
+
+    measured = 0.5 * shape + noise
+    output = Output("airframe", "roll_rate_rad_per_s", measured, predict, 1.0, 120.0)
+    case = Case(read_rig(shipped_rigs()["c172p"]), "wheel", [output])
+    found = search_sets(case, [term(CLP, "ROLL"), BY_NAME["mass"]])[1]
+    assert [step.effect.of for step in found.steps] == ([CLP] if name == CLP else [])
+
+
 def test_functions_that_act_alike_are_a_group_with_names_as_in_the_model() -> None:
     """Two functions of a moment, whose signatures differ by less than the noise."""
     first, second, noise = np.random.default_rng(8).normal(size=(3, 3000))

@@ -621,14 +621,19 @@ def _choose(beam: Beam, rounds: tuple[dict[str, float], ...]) -> Choice:
 
     The probability of an effect is the sum over the sets with it, or with a law that contains it.
     Where every output is within its noise, no effect is the answer unless its evidence is far
-    behind: noise that is not quite as modelled is explained by some effect.
+    behind that of a set of functions of the model, which a user asks for, and which leaves every
+    output within its noise: noise that is not quite as modelled is explained by some effect.
     """
     ranked = beam.ranked()
     logs = np.array([beam.log(names) for names in ranked])
     weights = np.exp(logs - logs[0])
     weights /= weights.sum()
     best = beam.best if weights[0] > MOST else _determined(beam, ranked)
-    if beam.log(frozenset()) > logs[0] - GIVEN_UP and not beam.open_outputs(frozenset()):
+    if not beam.open_outputs(frozenset()) and (
+        beam.log(frozenset()) > logs[0] - GIVEN_UP
+        or not all(effect.of for effect in beam.fits[best].effects)
+        or beam.open_outputs(best)
+    ):
         best = frozenset()
     fitted = beam.fits[best]
     steps = []
