@@ -333,6 +333,8 @@ class JSBSimAirframe:
         fdm["ic/gamma-deg"] = math.degrees(flight.flight_path)
         self._start_engines()
         for wrapper in wrappers:
+            if wrapper.heading:
+                fdm[_MOVED_TO["heading_rad"]] = wrapper.heading
             wrapper.load(self)
         for name, value in flight.properties.items():
             self._set(name, value)

@@ -47,6 +47,8 @@ class Aircraft(Protocol):
 class Wrapper:
     """An addition to an aircraft; this base class does nothing."""
 
+    heading = 0.0  # of the aircraft in trim, rad from north
+
     @property
     def scaled(self) -> tuple[Part, ...]:
         """The parts of the model's forces and moments that it makes scalable at loading."""

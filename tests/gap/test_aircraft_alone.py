@@ -36,7 +36,7 @@ from coupled.rig.rig import Rig
 from coupled.rig.rigfile import read_rig
 from tests.support.airframes import motion_of, noisy, pulses
 from tests.support.commands import coupled
-from tests.support.ownlogs import flightgear_log, flown
+from tests.support.ownlogs import PROPERTIES, flightgear_log, flown
 from tests.support.rigs import bench
 
 AIRFRAME = Part("column", own=False)
@@ -110,6 +110,29 @@ def test_a_log_of_the_same_model_has_no_gap(healthy: Record) -> None:
     assert found.verdict == "no_gap"
     assert "No gap in the airframe: every stage that could be judged" in found.summary
     assert repr(found) == "Diagnosis(c172p, airframe: no_gap)"
+
+
+def test_a_log_to_the_east_is_flown_to_the_east(tmp_path: Path) -> None:
+    """The Earth turns: an aircraft is lighter by 2·Ω·v there, 8e-4 of its weight at 55 m/s."""
+    properties = (*PROPERTIES, "attitude/psi-rad")
+    log, _ = flown(tmp_path, {}, 9.0, properties=properties, heading_deg=90.0)
+    record = import_log(log)[0]
+    rig, _ = trimmed(alone(), {"log": record})
+    off = {one.channel: one.measured - one.predict(rig) for one in airframe_outputs(rig, record)}
+    assert np.abs(off["load_factor"]).max() < 2e-4
+    assert np.abs(off["pitch_rate_rad_per_s"]).max() < 1e-5
+
+
+def test_surfaces_that_jump_between_the_rows_are_no_fault(tmp_path: Path) -> None:
+    log, _ = flown(tmp_path, {}, 9.0, rate_Hz=60.0, by_hand=False)
+    record = import_log(log)[0]
+    noise = np.random.default_rng(6).normal(scale=2e-4, size=record.data.shape)
+    noise[:, 0] = 0.0  # of time
+    records = {"log": Record(record.channels, record.data + noise, record.manifest)}
+    rig, _ = trimmed(at_rate_of(alone(), records), records)
+    for output in airframe_outputs(rig, records["log"]):
+        off = output.measured - output.predict(rig)
+        assert np.sqrt(np.mean(off**2)) < 1.2 * output.floor, output.channel
 
 
 def test_the_lateral_motion_is_compared_if_aileron_and_rudder_are_recorded(healthy: Record) -> None:

@@ -53,10 +53,11 @@ FLIGHTGEAR = {
 }
 
 
-def manoeuvre(length_s: float, size: float = 0.12) -> Floats:
+def manoeuvre(length_s: float, size: float = 0.12, by_hand: bool = True) -> Floats:
     """Return commands of elevator, aileron and rudder about trim, shape (frames, 3).
 
-    A 3-2-1-1 and doublets of the elevator, and doublets of the others.
+    A 3-2-1-1 and doublets of the elevator, and doublets of the others. Those that are not `by_hand`
+    jump within a step.
     """
     t = np.arange(round(length_s * RATE_Hz)) / RATE_Hz
     asked = np.zeros((len(t), 3))
@@ -71,6 +72,8 @@ def manoeuvre(length_s: float, size: float = 0.12) -> Floats:
         control = (1, 2, 0)[i % 3]
         hold(control, at, 0.5, 1.0)
         hold(control, at + 0.5, 0.5, -1.0)
+    if not by_hand:
+        return asked
     hand = np.hanning(25) / np.sum(np.hanning(25))  # a hand takes a tenth of a second
     return np.column_stack([np.convolve(each, hand, mode="same") for each in asked.T])
 
@@ -83,12 +86,14 @@ def flown(
     rate_Hz: float = RATE_Hz,
     properties: Sequence[str] = PROPERTIES,
     controls: int = 3,
+    heading_deg: float = 0.0,
+    by_hand: bool = True,
 ) -> tuple[Path, Floats]:
     """Fly an edited copy of a model from trim in bare JSBSim, with its own CSV output.
 
     `factors` are on functions by the ends of their names, `controls` how many of elevator, aileron
-    and rudder move. Returns the CSV file, and the properties at each frame, shape (frames,
-    properties).
+    and rudder move, `by_hand` or in jumps. Returns the CSV file, and the properties at each frame,
+    shape (frames, properties).
     """
     models = edited_model(folder / "edited", model, multiplied(factors))
     listed = "".join(f"<property>{name}</property>" for name in properties)
@@ -99,6 +104,7 @@ def flown(
     fdm.load_model(model)
     fdm.set_dt(1.0 / RATE_Hz)
     fdm["ic/vc-kts"], fdm["ic/h-sl-ft"] = 52.0 / KNOT_m_per_s, 1200.0 / FOOT_m
+    fdm["ic/psi-true-deg"] = heading_deg
     fdm["propulsion/set-running"] = -1
     fdm["fcs/mixture-cmd-norm"] = 1.0
     fdm.set_output_path(str(folder))
@@ -107,7 +113,7 @@ def flown(
     fdm["simulation/do_simple_trim"] = 1
     names = [f"fcs/{name}-cmd-norm" for name in ("elevator", "aileron", "rudder")]
     trim, rows = [fdm[name] for name in names], []
-    for asked in manoeuvre(length_s)[:, :controls]:
+    for asked in manoeuvre(length_s, by_hand=by_hand)[:, :controls]:
         rows.append([fdm[name] for name in properties])
         for name, held, moved in zip(names, trim, asked.tolist(), strict=False):
             fdm[name] = held + moved

@@ -3,6 +3,9 @@
 Wind, gusts and events are in the manifest of a record. The conditions of a simulated flight are
 known exactly: they act on the model too, and are not reported as effects. They are unknown for
 other records, and for a part of a record that does not begin with the flight.
+
+The Earth turns, so a flight to the east is lighter than one to the north, by 2·Ω·v. A model starts
+to the north; for a log of another program it starts at the heading of the log.
 """
 
 from __future__ import annotations
@@ -20,6 +23,7 @@ from coupled.record.channels import ControlName
 from coupled.record.record import Record
 
 FILE = "the manifest"
+HEADING = "heading_rad"
 
 
 def conditions_of(record: Record) -> Conditions:
@@ -44,10 +48,20 @@ def reach_of(record: Record, control: ControlName) -> float:
 
 
 def wrappers_of(record: Record, frame_s: float) -> list[Wrapper]:
-    """Return the conditions of a record as wrappers of an aircraft."""
+    """Return the conditions of a record, and its first heading, as wrappers of an aircraft."""
     seed = record.manifest.get("seed")
     drawn = seed if isinstance(seed, int) else 0
-    return condition_wrappers(conditions_of(record), FILE, frame_s, drawn)
+    acting = condition_wrappers(conditions_of(record), FILE, frame_s, drawn)
+    if "conditions" not in record.manifest and HEADING in record:
+        acting = [*acting, Headed(float(record[HEADING][0]))]
+    return acting
+
+
+class Headed(Wrapper):
+    """A heading of the start."""
+
+    def __init__(self, heading: float) -> None:
+        self.heading = heading
 
 
 def trim_shift(record: Record, control: ControlName, frame_s: float) -> Floats:

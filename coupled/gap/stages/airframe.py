@@ -202,12 +202,22 @@ class Model:
             return [plain(), None]
         return in_threads(lambda fly: fly(), [plain, restarted])
 
-    def unknown_between(self, plain: Floats) -> Floats:
-        """Return the change of the flight by another interpolation between the rows."""
-        flight = _in_time(self.rig)
+    def unknown_between(self, plain: Floats, by_shots: bool = False) -> list[float]:
+        """Return the mean square change of each channel by other interpolations between the rows.
+
+        `by_shots`: those of `SHOT`.
+        """
+        flight, restarts = _in_time(self.rig), self.restarts if by_shots else None
         if self.rig.controls or flight.steps_per_frame == 1:
-            return np.zeros_like(plain)
-        return self.fly(flight, self.moved, between="spline").motion - plain
+            return [0.0] * plain.shape[1]
+        states = None if restarts is None else restarts.at()
+
+        def change(law: Between) -> Floats:
+            other = self.fly(flight, self.moved, between=law, restarts=states).motion
+            return np.asarray(np.mean((other - plain) ** 2, axis=0))
+
+        others: tuple[Between, ...] = ("spline", "jumps")
+        return [float(one) for one in np.sum(in_threads(change, others), axis=0)]
 
     def restarted(self) -> Floats:
         """Return the change of `SHOT` by restarts from the model's own states.
@@ -349,8 +359,8 @@ def airframe_outputs(
         measured = record[name]
         noise = left_noise(estimate_noise(measured), measured, measured - flown.motion[:, i])
         own = float(np.hypot(noise.rms, KNOWN * np.ptp(measured)))
-        errors, between = [one[:, i] for one in carried], float(np.mean(unknown[:, i] ** 2))
-        outputs.append(_output(model, name, model.flown, i, noise, own, errors, between))
+        errors = [one[:, i] for one in carried]
+        outputs.append(_output(model, name, model.flown, i, noise, own, errors, unknown[i]))
     if model.restarts is not None and not is_throttled(record):
         outputs += _slow_outputs(model, wrong)
     if "column" in trims:
@@ -365,6 +375,7 @@ def _slow_outputs(model: Model, wrong: Sequence[Sequence[Moved]]) -> list[Output
     errors_of, plain = model.flights.errors, shots.motion
     carried = errors_of("shots", flight, lambda: model.carried(wrong, plain, by_shots=True))
     (restarted,) = errors_of("restarts", flight, lambda: [model.restarted()])
+    unknown = model.unknown_between(plain, by_shots=True)
     outputs = []
     for i, name in enumerate(SHOT[1:], 1):
         measured = record[name]
@@ -372,7 +383,7 @@ def _slow_outputs(model: Model, wrong: Sequence[Sequence[Moved]]) -> list[Output
         known = KNOWN * np.ptp(measured)
         own = float(np.sqrt(noise.rms**2 + known**2 + np.mean(restarted[:, i] ** 2)))
         errors = [one[:, i] for one in carried]
-        outputs.append(_output(model, name, model.shots, i, noise, own, errors))
+        outputs.append(_output(model, name, model.shots, i, noise, own, errors, unknown[i]))
     return outputs
 
 
@@ -384,7 +395,7 @@ def _output(
     noise: Noise,
     own: float,
     errors: Sequence[Floats],
-    between: float = 0.0,
+    between: float,
 ) -> Output:
     """Return a channel as an output, predicted by a column of a flight of a rig.
 

@@ -23,6 +23,7 @@ from typing import Literal
 
 import numpy as np
 from scipy.interpolate import CubicSpline, PchipInterpolator
+from scipy.ndimage import median_filter
 
 from coupled.flight.aircraft import make_aircraft
 from coupled.flight.airframe import JSBSimAirframe
@@ -42,7 +43,7 @@ from coupled.schema import changed
 from coupled.units import FOOT_m
 
 Points = tuple[Floats, Floats]
-Between = Literal["held", "pchip", "spline"]
+Between = Literal["held", "pchip", "spline", "jumps"]
 States = Mapping[int, Mapping[str, float]]  # by row: the measured states, by channel
 SLOW = ("true_airspeed_m_per_s", "pitch_rad")
 NEEDS = (*SLOW, "alpha_rad", "pitch_rate_rad_per_s")
@@ -110,7 +111,7 @@ class Manner:
 
     air           the motion of the air
     between_rows  how the commands change over a frame of several steps: `held`, as those of a host,
-                  or interpolated
+                  or interpolated, or with jumps at a frame's start
     restarts      states of the motion from which the flight goes on, by row
     coarse        whether steps are twice as wide; rows between them are interpolated
     """
@@ -165,9 +166,8 @@ def fly_open_loop(
     if steps == 1:
         asked = asked[1:] if wide == 1 else in_pairs(asked[1:])
     else:  # at each step after the first row
-        law = PchipInterpolator if manner.between_rows == "pchip" else CubicSpline
         at = (1.0 + np.arange((len(asked) - 1) * steps)) / steps
-        asked = law(np.arange(len(asked)), asked, axis=0)(at)
+        asked = _between(asked, at, manner.between_rows)
     states = {row * steps // wide: state for row, state in manner.restarts.items()}
     led = [
         _Led(i, airframe.reader(PROPERTIES[one.channel]), one.gain)
@@ -179,6 +179,22 @@ def fly_open_loop(
         known = wide * np.arange(len(motion))
         motion = np.column_stack([np.interp(np.arange(rows), known, one) for one in motion.T])
     return Flown(motion, trim)
+
+
+def _between(rows: Floats, at: Floats, law: Between) -> Floats:
+    """Return the commands of rows, shape (rows, controls), at given numbers of rows.
+
+    A jump may lie anywhere between two rows. An interpolation spreads it over the frame; by `jumps`
+    it is at the start of the frame. It is what exceeds the median change of three frames.
+    """
+    jumped = np.zeros_like(rows)
+    if law == "jumps":
+        changes = np.diff(rows, axis=0)
+        usual = median_filter(changes, size=(3, 1), mode="nearest")
+        jumped[1:] = np.cumsum(changes - usual, axis=0)
+    smooth = CubicSpline if law == "spline" else PchipInterpolator
+    line = smooth(np.arange(len(rows)), rows - jumped, axis=0)(at)
+    return np.asarray(line + jumped[np.ceil(at).astype(int)])
 
 
 @dataclass
