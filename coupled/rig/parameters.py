@@ -409,18 +409,18 @@ class Flight(Section):
     direct_controls: bool = True
     landing: bool = False
     steps_per_frame: int = quantity("", 1, ge=1, le=100)
-    elevator_effectiveness: float = quantity("", 1.0, ge=0, le=10)
-    aileron_effectiveness: float = quantity("", 1.0, ge=0, le=10)
-    rudder_effectiveness: float = quantity("", 1.0, ge=0, le=10)
-    pitch_damping: float = quantity("", 1.0, ge=0, le=10)
-    roll_damping: float = quantity("", 1.0, ge=0, le=10)
-    yaw_damping: float = quantity("", 1.0, ge=0, le=10)
-    pitch_stiffness: float = quantity("", 1.0, ge=0, le=10)
-    dihedral_effect: float = quantity("", 1.0, ge=0, le=10)
-    directional_stability: float = quantity("", 1.0, ge=0, le=10)
-    adverse_yaw: float = quantity("", 1.0, ge=0, le=10)
-    lift_slope: float = quantity("", 1.0, ge=0, le=10)
-    side_force_slope: float = quantity("", 1.0, ge=0, le=10)
+    elevator_effectiveness: float = quantity("", 1.0, ge=-10, le=10)
+    aileron_effectiveness: float = quantity("", 1.0, ge=-10, le=10)
+    rudder_effectiveness: float = quantity("", 1.0, ge=-10, le=10)
+    pitch_damping: float = quantity("", 1.0, ge=-10, le=10)
+    roll_damping: float = quantity("", 1.0, ge=-10, le=10)
+    yaw_damping: float = quantity("", 1.0, ge=-10, le=10)
+    pitch_stiffness: float = quantity("", 1.0, ge=-10, le=10)
+    dihedral_effect: float = quantity("", 1.0, ge=-10, le=10)
+    directional_stability: float = quantity("", 1.0, ge=-10, le=10)
+    adverse_yaw: float = quantity("", 1.0, ge=-10, le=10)
+    lift_slope: float = quantity("", 1.0, ge=-10, le=10)
+    side_force_slope: float = quantity("", 1.0, ge=-10, le=10)
     drag: float = quantity("", 1.0, ge=0, le=10)
     thrust: float = quantity("", 1.0, ge=0, le=10)
     mass: float = quantity("", 1.0, gt=0, le=10)
@@ -434,7 +434,7 @@ class Flight(Section):
     lateral_gust_rms: float = quantity("m_per_s", 0.0, ge=0, le=30)
     gust_length: float = quantity("m", 150.0, gt=0)
     properties: dict[str, float] = {}
-    terms: dict[str, Annotated[float, Field(ge=0, le=10)]] = {}
+    terms: dict[str, Annotated[float, Field(ge=-10, le=10)]] = {}
     # By control, those of its section of the rig: they belong to the model.
     surfaces: dict[str, SurfaceProperties] = derived({})
 

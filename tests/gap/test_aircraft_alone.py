@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -22,10 +23,12 @@ from coupled.gap.checks import (
     unmeasured_trim,
 )
 from coupled.gap.diagnose import diagnose, findings
+from coupled.gap.effects.library import BY_NAME
 from coupled.gap.findings.diagnosis import Diagnosis
 from coupled.gap.findings.flown import fly_force
 from coupled.gap.findings.where import lone_channel
 from coupled.gap.prepare import prepare
+from coupled.gap.search.beam import search_sets
 from coupled.gap.search.histories import search
 from coupled.gap.stages.airframe import airframe_outputs
 from coupled.gap.stages.openloop import is_throttled
@@ -52,6 +55,13 @@ def without(record: Record, *names: str) -> Record:
     kept = [name for name in record.channels if name not in names]
     data = np.column_stack([record[name] for name in kept])
     return Record(tuple(kept), data, record.manifest)
+
+
+def with_noise(record: Record) -> Record:
+    """Return a record with noise of 2e-4 SI on each channel but time."""
+    noise = np.random.default_rng(6).normal(scale=2e-4, size=record.data.shape)
+    noise[:, 0] = 0.0
+    return Record(record.channels, record.data + noise, record.manifest)
 
 
 def factor(found: Diagnosis, name: str) -> tuple[float, float, float]:
@@ -125,14 +135,26 @@ def test_a_log_to_the_east_is_flown_to_the_east(tmp_path: Path) -> None:
 
 def test_surfaces_that_jump_between_the_rows_are_no_fault(tmp_path: Path) -> None:
     log, _ = flown(tmp_path, {}, 9.0, rate_Hz=60.0, by_hand=False)
-    record = import_log(log)[0]
-    noise = np.random.default_rng(6).normal(scale=2e-4, size=record.data.shape)
-    noise[:, 0] = 0.0  # of time
-    records = {"log": Record(record.channels, record.data + noise, record.manifest)}
+    records = {"log": with_noise(import_log(log)[0])}
     rig, _ = trimmed(at_rate_of(alone(), records), records)
     for output in airframe_outputs(rig, records["log"]):
         off = output.measured - output.predict(rig)
         assert np.sqrt(np.mean(off**2)) < 1.2 * output.floor, output.channel
+
+
+@pytest.mark.parametrize(
+    ("function", "name", "factor"), [("/Cmq", "pitch_damping", 0.0), ("/Cnda", "adverse_yaw", -1.0)]
+)
+def test_a_missing_or_reversed_derivative_is_found_beside_jumps(
+    tmp_path: Path, function: str, name: str, factor: float
+) -> None:
+    log, _ = flown(tmp_path, {function: factor}, 12.0, rate_Hz=60.0, by_hand=False)
+    records = {"log": with_noise(import_log(log)[0])}
+    case = prepare(alone(), records, AIRFRAME).case
+    library = [BY_NAME[one] for one in (name, "motion_skew")]
+    found = search_sets(replace(case, outputs_with_noise_of=None), library)[1]
+    assert [step.effect.name for step in found.steps] == [name]
+    assert found.fit.values[f"{name}.factor"] == pytest.approx(factor, abs=0.05)
 
 
 def test_the_lateral_motion_is_compared_if_aileron_and_rudder_are_recorded(healthy: Record) -> None:

@@ -19,6 +19,10 @@ _DRAWN = {
 }
 
 
+# A derivative of a model may be missing or have the wrong sign; a mass or a force is positive.
+_ANY_SIGN, _POSITIVE = (-10.0, 10.0), (0.1, 10.0)
+
+
 def _factor_on(
     name: str,
     start: float,
@@ -26,7 +30,7 @@ def _factor_on(
     y: str,
     drawing: Drawing = "law",
     needs: tuple[str, ...] = (),
-    bounds: tuple[float, float] = (0.1, 10.0),
+    bounds: tuple[float, float] = _ANY_SIGN,
 ) -> Effect:
     """Return the effect of a factor of the rig's `flight` section."""
     number = factor(f"flight.{name}", start, *bounds)
@@ -53,12 +57,12 @@ AIRFRAME: tuple[Effect, ...] = (
     _factor_on("side_force_slope", 1.1, "sideslip", "yaw_left", needs=(_SLIP,)),
     _factor_on("adverse_yaw", 1.2, "aileron", "yaw_rate", "loop", (_YAW,)),
     _factor_on("lift_slope", 0.97, "alpha", "load_answer", "loop", bounds=(0.2, 5.0)),
-    _factor_on("drag", 1.1, "alpha", "load_answer", "loop"),
-    _factor_on("thrust", 1.1, "alpha", "load_answer", "loop"),
+    _factor_on("drag", 1.1, "alpha", "load_answer", "loop", bounds=_POSITIVE),
+    _factor_on("thrust", 1.1, "alpha", "load_answer", "loop", bounds=_POSITIVE),
     _factor_on("mass", 1.03, "alpha", "load_answer", "loop", bounds=(0.3, 3.0)),
-    _factor_on("roll_inertia", 1.1, "aileron", "roll_rate", "loop", (_ROLL,)),
-    _factor_on("pitch_inertia", 1.1, "elevator", "pitch_rate", "loop"),
-    _factor_on("yaw_inertia", 1.1, "rudder", "yaw_rate", "loop", (_YAW,)),
+    _factor_on("roll_inertia", 1.1, "aileron", "roll_rate", "loop", (_ROLL,), _POSITIVE),
+    _factor_on("pitch_inertia", 1.1, "elevator", "pitch_rate", "loop", bounds=_POSITIVE),
+    _factor_on("yaw_inertia", 1.1, "rudder", "yaw_rate", "loop", (_YAW,), _POSITIVE),
     entry(
         *("airframe", "center_of_gravity", ("alpha", "pitch_rate", "loop", 4.0)),
         added("aft_m", "flight.cg_aft_m", -2.0, 2.0, 0.02),
@@ -73,7 +77,7 @@ def term(function: str, axis: str) -> Effect:
 
     That of a lateral axis needs the motion of the axis.
     """
-    number = factor(f"flight.{TERMS}{function}", 0.9, 0.0)
+    number = factor(f"flight.{TERMS}{function}", 0.9, *_ANY_SIGN)
     drawn = _DRAWN.get(axis, ("alpha", "load_answer", "loop", 4.0))
     needs = _NEEDS.get(axis, ())
     return entry("airframe", f"{TERM} {function}", drawn, number, needs=needs, of=function)

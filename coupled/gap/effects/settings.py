@@ -24,7 +24,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from coupled.gap.effects.effect import BY_REGRESSOR, Effect, Parameter, entry, setting_of, value
-from coupled.gap.effects.library import BY_NAME, EFFECTS, LAG, STAMP
+from coupled.gap.effects.library import BY_NAME, EFFECTS, LAG, MOTION, STAMP
 from coupled.gap.noise.smooth import rate_of, smoothed
 from coupled.gap.signals.output import Output
 from coupled.gap.signals.reading import Reading
@@ -41,10 +41,14 @@ def settings(rig: Rig, control: ControlName, outputs: Sequence[Output] = ()) -> 
     """Return {effect that frees the same key: nuisance parameter within its tolerance}.
 
     If an output is of loader and linkage in series, the linkage's parameters show in both. An
-    aircraft alone has none.
+    aircraft alone has none, but for the time stamps of its motion if it takes several steps between
+    two rows of a log: the rows do not show at which of them a surface moves.
     """
     if not rig.controls:
-        return {}
+        assert rig.flight is not None
+        half_s = 0.5 / rig.frame_rate
+        stamps = setting_of(BY_NAME[MOTION], -half_s, half_s, 0.0)
+        return {} if rig.flight.steps_per_frame == 1 else {MOTION: stamps}
     given, found = rig.controls[control].tolerance, dict[str, Effect]()
     in_series = any(output.in_series for output in outputs)
     for effect in EFFECTS:
