@@ -39,7 +39,7 @@ from coupled.rig.rig import Rig
 from coupled.rig.rigfile import read_rig
 from tests.support.airframes import motion_of, noisy, pulses
 from tests.support.commands import coupled
-from tests.support.ownlogs import PROPERTIES, flightgear_log, flown
+from tests.support.ownlogs import OF_THE_GUIDE, PROPERTIES, flightgear_log, flown
 from tests.support.rigs import bench
 
 AIRFRAME = Part("column", own=False)
@@ -90,7 +90,8 @@ def test_a_log_of_jsbsim_shows_what_was_edited_in_its_model(tmp_path: Path) -> N
     assert number["low"] < 0.7 < number["high"]
     assert number["value"] == pytest.approx(0.7, abs=0.01)
     improved = load_rig(tmp_path / "new.toml")
-    assert improved == alone().changed({"flight.pitch_damping": improved["flight.pitch_damping"]})
+    fitted = ("flight.pitch_damping", "flight.motion_stamp_s")
+    assert improved == alone().changed({key: improved[key] for key in fitted})
     assert improved["flight.pitch_damping"] == pytest.approx(number["value"])
 
 
@@ -127,7 +128,7 @@ def test_a_log_to_the_east_is_flown_to_the_east(tmp_path: Path) -> None:
     properties = (*PROPERTIES, "attitude/psi-rad")
     log, _ = flown(tmp_path, {}, 9.0, properties=properties, heading_deg=90.0)
     record = import_log(log)[0]
-    rig, _ = trimmed(alone(), {"log": record})
+    rig = trimmed(alone(), {"log": record})[0]["log"]
     off = {one.channel: one.measured - one.predict(rig) for one in airframe_outputs(rig, record)}
     assert np.abs(off["load_factor"]).max() < 2e-4
     assert np.abs(off["pitch_rate_rad_per_s"]).max() < 1e-5
@@ -136,7 +137,7 @@ def test_a_log_to_the_east_is_flown_to_the_east(tmp_path: Path) -> None:
 def test_surfaces_that_jump_between_the_rows_are_no_fault(tmp_path: Path) -> None:
     log, _ = flown(tmp_path, {}, 9.0, rate_Hz=60.0, by_hand=False)
     records = {"log": with_noise(import_log(log)[0])}
-    rig, _ = trimmed(at_rate_of(alone(), records), records)
+    rig = trimmed(at_rate_of(alone(), records), records)[0]["log"]
     for output in airframe_outputs(rig, records["log"]):
         off = output.measured - output.predict(rig)
         assert np.sqrt(np.mean(off**2)) < 1.2 * output.floor, output.channel
@@ -155,6 +156,17 @@ def test_a_missing_or_reversed_derivative_is_found_beside_jumps(
     found = search_sets(replace(case, outputs_with_noise_of=None), library)[1]
     assert [step.effect.name for step in found.steps] == [name]
     assert found.fit.values[f"{name}.factor"] == pytest.approx(factor, abs=0.05)
+
+
+def test_when_a_surface_steps_between_two_rows_is_not_known(tmp_path: Path) -> None:
+    """A late or early time stamp of the motion, at 0.85, was the answer for a healthy model."""
+    log, _ = flown(tmp_path, {}, 9.0, properties=OF_THE_GUIDE, controls=1, by_hand=False)
+    whole = import_log(log)[0]
+    noise = 1e-3 * np.random.default_rng(1).standard_normal(whole.data.shape)
+    noise[:, 0] = 0.0
+    data = (whole.data + noise)[::2]  # a script's steps act just after a row, or just before
+    found = diagnose(alone(), {"log": Record(whole.channels, data)})
+    assert found.verdict == "no_gap"
 
 
 def test_the_lateral_motion_is_compared_if_aileron_and_rudder_are_recorded(healthy: Record) -> None:

@@ -77,6 +77,16 @@ def test_a_filed_friction_that_yields_before_it_slips_is_no_gap(tmp_path: Path) 
             True,
             "friction that yields by 2.3 mrad before it slips",
         ),
+        (
+            SettingResult("motion_stamp_s", "airframe", late_s=-4.37e-3),
+            True,
+            "motion that is stamped 4.4 ms early",
+        ),
+        (
+            SettingResult("force_stamp_s", "loader", late_s=2e-5),
+            False,
+            "force that is stamped 0.02 ms late",
+        ),
     ],
 )
 def test_a_setting_says_what_it_was_found_to_be(

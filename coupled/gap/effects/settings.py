@@ -40,15 +40,14 @@ CONTACT = ("loader.friction_stiffness_N_per_{d}", "loader.friction_elastic_share
 def settings(rig: Rig, control: ControlName, outputs: Sequence[Output] = ()) -> dict[str, Effect]:
     """Return {effect that frees the same key: nuisance parameter within its tolerance}.
 
-    If an output is of loader and linkage in series, the linkage's parameters show in both. An
-    aircraft alone has none, but for the time stamps of its motion if it takes several steps between
-    two rows of a log: the rows do not show at which of them a surface moves.
+    If an output is of loader and linkage in series, the linkage's parameters show in both. Of an
+    aircraft alone it is the time stamp of the motion, known to half a row where the model takes
+    several steps between two: the rows do not show at which of them a surface moves.
     """
     if not rig.controls:
         assert rig.flight is not None
-        half_s = 0.5 / rig.frame_rate
-        stamps = setting_of(BY_NAME[MOTION], -half_s, half_s, 0.0)
-        return {} if rig.flight.steps_per_frame == 1 else {MOTION: stamps}
+        half_s = CLOCK_s if rig.flight.steps_per_frame == 1 else max(CLOCK_s, 0.5 / rig.frame_rate)
+        return {MOTION: setting_of(BY_NAME[MOTION], -half_s, half_s, 0.0)}
     given, found = rig.controls[control].tolerance, dict[str, Effect]()
     in_series = any(output.in_series for output in outputs)
     for effect in EFFECTS:

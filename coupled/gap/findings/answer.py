@@ -111,7 +111,7 @@ def _held_together(stages: Sequence[StageResult], shares: Sequence[float]) -> fl
 def settings_of(
     choice: Choice, rig: Rig, control: ControlName, outputs: Sequence[Output]
 ) -> tuple[SettingResult, ...]:
-    """Return the fitted nuisance parameters, each as a factor on its filed value.
+    """Return the fitted nuisance parameters, each as a factor on its filed value, or as a delay.
 
     Without effects they are within their tolerance, as the stages are judged then.
     """
@@ -120,7 +120,10 @@ def settings_of(
     for setting in settings(rig, control, outputs).values():
         for p in setting.free:
             key = setting.value_key(p)
-            if key in fit.values and (filed := p.nominal(rig, control)):
+            if key in fit.values and p.key.endswith("_stamp_s"):
+                name, shown = field_of(rig, control, p.key), stage_of(setting.shows_in[0])
+                found.append(SettingResult(name, shown, late_s=fit.values[key]))
+            elif key in fit.values and (filed := p.nominal(rig, control)):
                 factor = float(p.entered(filed, fit.values[key]) / filed)
                 found.append(SettingResult(field_of(rig, control, p.key), setting.stage, factor))
     length = next((one.value_key(one.free[0]) for one in contact(rig, control)), "")

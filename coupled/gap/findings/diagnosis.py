@@ -256,9 +256,9 @@ class Diagnosis(Findings, TableResult):
             "budget": {one.stage: one.as_dict() for one in self.budget},
             "budget_95": {one.stage: one.intervals() for one in self.budget},
             "shrink": self.shrink.as_dict(),
-            "settings": {one.name: one.factor for one in self.settings if one.yields is None},
+            "settings": {one.name: one.factor for one in self.settings if one.value is None},
         }
-        found |= {one.name: one.yields for one in self.settings if one.yields is not None}
+        found |= {one.name: one.value for one in self.settings if one.value is not None}
         if self._curved:
             found["curves"] = [one.as_dict() for one in self.curves]
             found["shrink"]["with_curves"] = [one.as_dict() for one in self.shrunk_by_curves]

@@ -208,22 +208,32 @@ class SettingResult:
     """A fitted nuisance parameter, as a factor on its nominal value.
 
     For filed friction without a filed stiffness, `yields` is its presliding displacement instead,
-    m or rad.
+    m or rad; for a time stamp, `late_s` is its delay.
     """
 
     name: str
     stage: str
     factor: float = 1.0
     yields: float | None = None
+    late_s: float | None = None
+
+    @property
+    def value(self) -> float | None:
+        """The number that is reported in place of a factor, if any."""
+        return self.yields if self.late_s is None else self.late_s
 
     @property
     def moved(self) -> bool:
         """Whether the deviation is large enough to show in `words`."""
-        return self.yields is not None or abs(self.factor - 1.0) >= 5e-4
+        off = self.factor - 1.0 if self.late_s is None else 10.0 * self.late_s
+        return self.yields is not None or abs(off) >= 5e-4
 
     @property
     def words(self) -> str:
         """The deviation in words."""
+        if self.late_s is not None:
+            late = f"{1e3 * abs(self.late_s):.2g} ms {'late' if self.late_s > 0.0 else 'early'}"
+            return f"{self.name.split('_')[0]} that is stamped {late}"
         if self.yields is None:
             return f"{self.name.replace('_', ' ')} {100 * (self.factor - 1):+.1f} %"
         unit = "mrad" if self.name.endswith("rad") else "mm"
