@@ -25,13 +25,14 @@ import numpy as np
 from coupled.errors import InputError
 from coupled.gap.chain import AIRFRAME, STAGES, Part
 from coupled.gap.checks import unmeasured_trim
+from coupled.gap.effects.library import MOTION
 from coupled.gap.findings.answer import effects_of, incredible, settings_of, verdict_of
 from coupled.gap.findings.budget import floors_of, shrink, stage_budget
 from coupled.gap.findings.curves import find_curves
 from coupled.gap.findings.diagnosis import Diagnosis, PartDiagnosis, WholeDiagnosis
 from coupled.gap.findings.healthy import Baseline, beside_healthy
 from coupled.gap.findings.judge import Judge
-from coupled.gap.findings.result import StageResult
+from coupled.gap.findings.result import EffectResult, StageResult
 from coupled.gap.findings.where import lone_channel
 from coupled.gap.prepare import Prepared, prepare
 from coupled.gap.search.case import Case, Tell
@@ -272,7 +273,7 @@ def findings(prepared: Prepared, case: Case, choice: Choice) -> PartDiagnosis:
         settings=settings_of(choice, case.nominal, case.control, outputs),
         shrink=shrink(case, fitted, floors),
         nominal=case.nominal,
-        improved=fit.rig,
+        improved=_as_stamped(fit.rig, case.nominal, effects),
         records=dict(prepared.records),
         readers=readers,
         outputs=tuple(outputs),
@@ -285,6 +286,14 @@ def findings(prepared: Prepared, case: Case, choice: Choice) -> PartDiagnosis:
         inseparable=inseparable(fit, case.control),
         curved=curves,
     )
+
+
+def _as_stamped(rig: Rig, filed: Rig, effects: Sequence[EffectResult]) -> Rig:
+    """Return a rig with the filed stamps of the motion, if only the rows of a log shift them."""
+    if filed.controls or any(one.name == MOTION for one in effects):
+        return rig
+    assert filed.flight is not None
+    return rig.changed({"flight.motion_stamp_s": filed.flight.motion_stamp})
 
 
 def _of_part(part: Part, stages: Sequence[StageResult]) -> tuple[StageResult, ...]:
