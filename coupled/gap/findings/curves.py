@@ -169,17 +169,15 @@ def find_curves(
     ours = _above_noise(problem, choice)
     if len(ours) < 2:
         return beside.curves(case)
-    alone = _Curved.of(problem, choice, {e.name for e in choice.fit.effects} - ours, records)
+    alone = _Curved.of(problem, choice, sure - ours, records) if sure & ours else beside
     instead = alone.curves(case)
     if instead is None:
         return beside.curves(case)
-    known = [
-        evidence(problem, choice.fit, error),
-        *(one.evidence(error) for one in (beside, alone)),
-    ]
+    known = [evidence(problem, choice.fit, error), alone.evidence(error)]
+    known += [beside.evidence(error)] if sure & ours else []
     samples = fewest_unexplained(known)
-    by_effects, *others, by_curves = (one.log(samples) for one in known)
-    ahead = by_curves - max(by_effects, *others)
+    by_effects, by_curves, *by_both = (one.log(samples) for one in known)
+    ahead = by_curves - max(by_effects, *by_both)
     if ahead < 0.0:
         return beside.curves(case)
     return replace(instead, instead=ours, odds=math.exp(-ahead))
