@@ -18,7 +18,7 @@ from coupled.gap.findings.credibility import remainder
 from coupled.gap.search.found import Fit
 from coupled.gap.search.screen import Worth
 from coupled.gap.signals.output import Output, stage_gaps
-from coupled.gap.thresholds import CERTAIN, DRIFT, LENGTHS, PRIOR_EFFECT
+from coupled.gap.thresholds import CERTAIN, DRIFT, LENGTHS
 
 Off = Callable[..., Any]
 Original = Callable[..., Any]
@@ -46,11 +46,6 @@ def third(original: Original, first: Any, other: Any, argument: Any, *args: Any)
 
 def idle(original: Original, *args: Any, **options: Any) -> None:
     """Take the place of a rule that only adds fits to a beam."""
-
-
-def without_relief(original: Original, beam: Any, fitted: Fit, share: float = 1.0) -> Worth:
-    """Return the worth of a candidate, without the penalty that it may remove."""
-    return Worth(PRIOR_EFFECT + share * beam.behind(fitted), beam.counts)
 
 
 @dataclass(frozen=True)
@@ -85,16 +80,12 @@ class Rule:
 
 
 RULES = (
-    Rule("needed", "search.beam:Beam._needed", gives(frozenset()),
-         "an effect whose interval includes neutral is kept if all simpler sets lose by 5"),
     Rule("contact_once", "search.beam:_contact_values", gives({}),
          "laws of friction start from presliding parameters fitted before"),
     Rule("last_swaps", "search.beam:_sets_with_swap", gives([]),
          "swaps in the best set, at the end", "_fit_neighbours_of_best"),
     Rule("two_for_one", "search.beam:_fit_with_simpler_law", gives(None),
          "two effects of fewer parameters in place of a law of several"),
-    Rule("relief", "search.beam:Beam.worth", without_relief,
-         "screening deducts the nuisance parameters' penalty"),
     Rule("strained", "search.beam:relief_of", gives(0.0),
          "a set is explained only within the nuisance parameters' tolerance", "open_outputs"),
     Rule("best_first", "search.screen:Screen.still_worth", third,
@@ -102,13 +93,6 @@ RULES = (
     Rule("efficient_score", "search.screen:Screen._worth_a_fit",
          lambda original, *args, refitted=False: [] if refitted else original(*args),
          "a candidate is also screened by what the present effects cannot make of it"),
-    Rule("doubtful", "search.screen:Screen.best",
-         lambda original, screen, current, candidates, worth, *args, **options:
-             original(screen, current, candidates, worth, *args, **options) if worth.least else [],
-         "if no candidate is worth a fit beside the best set, a few are fitted all the same",
-         "_fit_neighbours"),
-    Rule("initial_contact", "search.problem:Problem.with_initial_contact", gives(None),
-         "without effects, screening also takes presliding parameters at their initial values"),
     Rule("refined", "search.screen:Screen._signature", gives([]),
          "candidates are also screened at larger and at projected sizes", "_refine_one"),
     Rule("smooth_error", "search.problem:ModelError.smooth",
@@ -117,8 +101,6 @@ RULES = (
     Rule("tolerance", "search.problem:Problem.within_tolerance", second,
          "effects are screened with nuisance parameters within their tolerance",
          "_fit_neighbours"),
-    Rule("determined", "search.beam:_determined", lambda original, beam, ranked: ranked[0],
-         "of alternatives below half, the first whose sizes are determined is reported"),
     Rule("noise_explains", "search.beam:Beam.open_outputs", gives({""}),
          "where noise explains all, no effect is the answer unless it is excluded", "_choose"),
     Rule("own_trim", "search.fit:_with_trim", gives(None),

@@ -42,7 +42,6 @@ from coupled.gap.thresholds import (
     RIVAL_GAIN,
     SHOOTINGS,
     TRIES,
-    VERY_STRONG,
 )
 from coupled.parallel import in_threads
 
@@ -123,45 +122,18 @@ class Beam:
         return self.known[names].log(self.counts)
 
     def valid(self) -> list[Names]:
-        """Return the admissible sets (`is_admissible`), those of fewest parameters first.
+        """Return the admissible sets (`is_admissible`).
 
         If no admissible set has more evidence than no effect, sets are admissible although the
         interval of a size contains the neutral value, if they have.
         """
-        valid = list[Names]()
-        for names in sorted(self.fits, key=lambda one: _numbers(self.fits[one])):
-            fitted = self.fits[names]
-            if not names or is_admissible(self.problem, fitted, self._needed(fitted, valid)):
-                valid.append(names)
+        valid = [n for n, fit in self.fits.items() if not n or is_admissible(self.problem, fit)]
         if not len(self.counts):
             return valid
         gained = [n for n in self.fits if n and self.log(n) > self.log(frozenset())]
         if not any(names in gained for names in valid):
-            valid += [n for n in gained if is_admissible(self.problem, self.fits[n], n)]
+            valid += [n for n in gained if is_admissible(self.problem, self.fits[n], sized=False)]
         return valid
-
-    def _needed(self, fitted: Fit, valid: Sequence[Names]) -> Names:
-        """Return the effects of a set that no simpler admissible set can do without.
-
-        The interval by slopes of such an effect may contain the neutral value where dry friction
-        makes the residual discontinuous; the evidence is then the better test. It must be very much
-        higher than that of each set of fewer parameters without the effect, and without a law that
-        contains it.
-        """
-        if not len(self.counts):
-            return frozenset()
-        numbers, here = _numbers(fitted), self.log(names_of(fitted.effects))
-        simpler = [n for n in valid if _numbers(self.fits[n]) < numbers]
-
-        def is_needed(effect: Effect) -> bool:
-            without = (
-                self.log(names)
-                for names in simpler
-                if not any(e is effect or contains(e, effect) for e in self.fits[names].effects)
-            )
-            return here - max(without, default=here) > VERY_STRONG
-
-        return frozenset(effect.name for effect in fitted.effects if is_needed(effect))
 
     def ranked(self) -> list[Names]:
         """Return the admissible sets, the one of highest evidence first."""
@@ -181,11 +153,9 @@ class Beam:
         """Return the predicted gain that one effect more needs to make a set the best one.
 
         The gain must exceed the log prior of an effect and a `share` of the evidence by which the
-        set is behind the best one: a prediction may show half of a gain. The nuisance parameters'
-        prior penalty is deducted: the effect may remove it.
+        set is behind the best one: a prediction may show half of a gain.
         """
-        needed = PRIOR_EFFECT + share * self.behind(fitted) - relief_of(fitted)
-        return Worth(needed, self.counts)
+        return Worth(PRIOR_EFFECT + share * self.behind(fitted), self.counts)
 
     def log_of(self, fitted: Fit) -> float:
         """Return the log evidence of a fit, possibly not of this beam."""
@@ -220,15 +190,15 @@ def names_of(effects: Iterable[Effect]) -> Names:
     return frozenset(effect.name for effect in effects)
 
 
-def is_admissible(problem: Problem, fitted: Fit, needed: Names = frozenset()) -> bool:
+def is_admissible(problem: Problem, fitted: Fit, sized: bool = True) -> bool:
     """Tell whether a fit is admissible.
 
-    The interval of each effect's size excludes the neutral value, unless the effect is `needed`, no
+    The interval of each effect's size excludes the neutral value, if they should be `sized`, no
     parameter is at a bound, and no frequency is above the Nyquist frequency.
     """
     fastest = 0.5 * min(output.frame_rate_Hz for output in problem.outputs)
     for effect in fitted.effects:
-        if effect.name not in needed and not _excludes_neutral(problem.case, fitted, effect):
+        if sized and not _excludes_neutral(problem.case, fitted, effect):
             return False
         for p in effect.free:
             key = effect.value_key(p)
@@ -327,11 +297,6 @@ def _fit_neighbours_of_best(beam: Beam, library: Sequence[Effect]) -> None:
         _finish(beam)
 
 
-def _numbers(fitted: Fit) -> int:
-    """Return how many parameters a set's effects have."""
-    return sum(len(effect.free) for effect in fitted.effects)
-
-
 def _fit_with_simpler_law(beam: Beam, law: Effect) -> Fit | None:
     """Return the best fit with an effect of fewer parameters in place of a law of the best set.
 
@@ -351,25 +316,24 @@ def _fit_with_simpler_law(beam: Beam, law: Effect) -> Fit | None:
 def _fit_neighbours(beam: Beam, fitted: Fit, library: Sequence[Effect], wanted: set[str]) -> None:
     """Fit the neighbours of a fitted set, with effects that show in the `wanted` outputs.
 
+    They are screened with nuisance parameters within their tolerance: beyond it these may have
+    absorbed an effect.
     The candidate of the largest predicted gain is fitted first. If it explains the outputs, others
     are fitted only if they may do better; otherwise all are, since a prediction may show a small
-    part of a large gain. If none is worth a fit beside the best set, a few are fitted all the same:
-    the gain of a law whose shape is far from that of its start cannot be predicted. A law that
-    contains another law is fitted after it, from its optimum, if the best set leaves an output
-    unexplained. Laws of dry friction start from presliding parameters that were fitted before.
+    part of a large gain. A law that contains another law is fitted after it, from its optimum, if
+    the best set leaves an output unexplained. Laws of dry friction start from presliding parameters
+    that were fitted before.
     """
     found, is_best = fitted, names_of(fitted.effects) == beam.best
+    fitted, many = beam.problem.within_tolerance(found), BEAM_CANDIDATES if is_best else TRIES
     beside = _candidates(found.effects, library, wanted)
-    fitted, screened = _worth_a_fit(beam, found, beside)
-    doubtful = is_best and not screened
-    if doubtful:
-        screened = beam.screen.best(fitted, beside, Worth(0.0, beam.counts), TRIES)
+    screened = beam.screen.best(fitted, beside, beam.worth(found), many, anew=is_best)
     effects = [one.effect for one in screened]
     plain = [one for one in screened if not any(contains(one.effect, e) for e in effects)]
     ends = list[Fit]()
     for some in (plain[:1], plain[1:]):
         still = some
-        if not (doubtful or (beam.best and beam.open_outputs(beam.best) & wanted)):
+        if not (beam.best and beam.open_outputs(beam.best) & wanted):
             still = beam.screen.still_worth(fitted, some, beam.worth(found, MOST))
         dry = next((one for one in still if one.effect.dry), None)
         if dry is not None and not beam.contact:
@@ -391,34 +355,6 @@ def _fit_neighbours(beam: Beam, fitted: Fit, library: Sequence[Effect], wanted: 
     if len(fitted.effects) > 1:
         others += [*_sets_with_swap(beam, fitted, library), *_sets_without_one(fitted)]
     _fit_sets(beam, others)
-
-
-def _worth_a_fit(
-    beam: Beam, found: Fit, candidates: Sequence[Effect]
-) -> tuple[Fit, list[Screened]]:
-    """Return the candidates worth a fit beside a set, and the set as it is beside them.
-
-    Its nuisance parameters are within their tolerance: beyond it they may have absorbed an effect.
-    The presliding parameters of a filed friction have no tolerance. Without effects the candidates
-    are also screened with their initial values, and the screen that predicts more is used.
-    """
-    problem, is_best = beam.problem, names_of(found.effects) == beam.best
-    many = BEAM_CANDIDATES if is_best else TRIES
-    fitted = problem.within_tolerance(found)
-    screened = beam.screen.best(fitted, candidates, beam.worth(found), many, anew=is_best)
-    initial = None if found.effects else problem.with_initial_contact(fitted)
-    if initial is None:
-        return fitted, screened
-    # What does not show in the loader does not depend on its contact.
-    apart = {e.name for e in candidates if "loader" not in e.shows_in}
-    same = {name: known for name, known in beam.screen.known.items() if name in apart}
-    screen = Screen(problem, beam.error, same)
-    others = screen.best(initial, candidates, beam.worth(initial), many)
-    most, more = (max((one.gain for one in some), default=0.0) for some in (screened, others))
-    if more - beam.behind(initial) <= most:
-        return fitted, screened
-    beam.screen = screen
-    return initial, others
 
 
 def _fit_by_multiple_shooting(beam: Beam) -> None:
@@ -628,7 +564,7 @@ def _choose(beam: Beam, rounds: tuple[dict[str, float], ...]) -> Choice:
     logs = np.array([beam.log(names) for names in ranked])
     weights = np.exp(logs - logs[0])
     weights /= weights.sum()
-    best = beam.best if weights[0] > MOST else _determined(beam, ranked)
+    best = beam.best
     if not beam.open_outputs(frozenset()) and (
         beam.log(frozenset()) > logs[0] - GIVEN_UP
         or not all(effect.of for effect in beam.fits[best].effects)
@@ -663,13 +599,6 @@ def _choose(beam: Beam, rounds: tuple[dict[str, float], ...]) -> Choice:
         rounds,
         float(weights[ranked.index(best)]),
     )
-
-
-def _determined(beam: Beam, ranked: Sequence[Names]) -> Names:
-    """Return the first set near the best whose sizes are determined; if there is none, the best."""
-    near = [names for names in ranked if beam.log(names) > beam.log(ranked[0]) - RIVAL_GAIN]
-    sure = (names for names in near if names and is_admissible(beam.problem, beam.fits[names]))
-    return next(sure, ranked[0])
 
 
 def _replaces(best: Names, other: Names, effect: Effect) -> bool:
