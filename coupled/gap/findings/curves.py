@@ -177,7 +177,7 @@ def find_curves(
     known += [beside.evidence(error)] if sure & ours else []
     samples = fewest_unexplained(known)
     by_effects, by_curves, *by_both = (one.log(samples) for one in known)
-    ahead = by_curves - max(by_effects, *by_both)
+    ahead = by_curves - max((by_effects, *by_both))
     if ahead < 0.0:
         return beside.curves(case)
     return replace(instead, instead=ours, odds=math.exp(-ahead))
