@@ -13,7 +13,7 @@ import pytest
 from coupled.blind.trials.make import Numbers, drawn
 from coupled.blind.trials.trial import draw_trial, plans
 from coupled.gap.diagnose import Diagnosis, diagnose
-from coupled.gap.effects.library import BY_NAME
+from coupled.gap.effects.airframe import term
 from coupled.gap.search.beam import _choose
 from coupled.rig.rig import Rig
 from tests.support.gaps import made, nominal_rig
@@ -88,7 +88,7 @@ def test_where_noise_explains_every_stage_an_effect_is_named_if_none_is_far_behi
     ahead: float, left: set[str], named: bool
 ) -> None:
     """Functions of a right model explain up to 7 of noise that is not quite as modelled."""
-    effect, none = BY_NAME["arc_geometry"], frozenset[str]()
+    effect, none = term("aero/coefficient/Cmq", "PITCH"), frozenset[str]()
     logs = {none: 0.0, frozenset({effect.name}): ahead}
     fits = {names: SimpleNamespace(effects=(effect,) if names else ()) for names in logs}
     beam: Any = SimpleNamespace(
