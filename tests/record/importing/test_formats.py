@@ -375,6 +375,46 @@ def test_names_above_and_beside_an_array_name_its_elements() -> None:
     assert "actual.positions[N]" not in found
 
 
+def read_messages(messages: list[dict[str, Any]], logged_ns: list[int]) -> dict[str, Any]:
+    """Return the columns of messages in JSON of one topic, by the names of their fields."""
+    file = io.BytesIO()
+    writer: Any = Writer(file)
+    writer.start()
+    schema = writer.register_schema("state", "jsonschema", b"{}")
+    channel = writer.register_channel("/arm", "json", schema)
+    for message, at_ns in zip(messages, logged_ns, strict=True):
+        writer.add_message(channel, at_ns, json.dumps(message).encode(), at_ns)
+    writer.finish()
+    read = mcap.read_mcap(Path("arm.mcap"), file.getvalue())
+    return {each.name.removeprefix("/arm."): each for each in read}
+
+
+def test_a_stamp_of_s_and_ns_has_its_unit_whatever_its_name() -> None:
+    messages = [{"timestamp": {"sec": k, "nsec": 5}, "old": {"stamp": 0.5 * k}} for k in range(3)]
+    found = read_messages(messages, [0, 1, 2])
+    assert found["timestamp"].values.tolist() == [5, 1_000_000_005, 2_000_000_005]
+    assert found["timestamp"].unit == "ns"
+    assert found["old.stamp"].unit == ""  # a number, of whatever unit
+
+
+def test_messages_are_read_in_the_order_of_the_file() -> None:
+    """Sorted by a stamp that is wrong, a row lay among others without a word."""
+    found = read_messages([{"force": k} for k in range(4)], [10, 20, 5, 40])
+    assert found["force"].values.tolist() == [0, 1, 2, 3]
+    assert found["log_time"].values.tolist() == [10, 20, 5, 40]
+
+
+def test_a_text_among_numbers_is_refused_by_its_message() -> None:
+    """It was an empty cell, and interpolated."""
+    messages: list[dict[str, Any]]
+    messages = [{"force": 1.0, "frame": "hand"}, {"force": None}, {"force": "off"}]
+    found = read_messages(messages, [1, 2, 3])
+    assert found["force"].refused == "message 3 of /arm holds 'off', not a number"
+    assert "frame" not in found
+    found = read_messages([*messages[:2], {"force": "NaN"}], [1, 2, 3])
+    assert not found["force"].refused
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [*CASES, "a.mat", "a.h5"])
 def test_a_broken_log_is_one_line(tmp_path: Path, name: str) -> None:

@@ -56,7 +56,7 @@ def read_mcap(path: Path, content: bytes) -> list[Found]:
     factories = [_Json(), Ros2(), Protobuf()]
     topics: dict[str, list[dict[str, _Value]]] = {}
     undecoded: set[str] = set()
-    for schema, channel, message in reader.iter_messages():
+    for schema, channel, message in reader.iter_messages(log_time_order=False):  # as in the file
         decode = next(
             filter(None, (f.decoder_for(channel.message_encoding, schema) for f in factories)), None
         )
@@ -65,7 +65,7 @@ def read_mcap(path: Path, content: bytes) -> list[Found]:
             continue
         row = {each.name: each for each in _values(decode(message.data), "", 0, ())}
         for name, ns in ((STAMPS, message.log_time), ("publish_time", message.publish_time)):
-            row[name] = _Value(name, ns)
+            row[name] = _Value(name, ns, unit="ns")
         topics.setdefault(channel.topic, []).append(row)
     columns = [each for topic, rows in topics.items() for each in _columns(topic, rows)]
     if not columns:
@@ -77,11 +77,16 @@ def read_mcap(path: Path, content: bytes) -> list[Found]:
 
 @dataclass(frozen=True)
 class _Value:
-    """A number of a message, by its name in it; `called` is the element's name, if it has one."""
+    """A number of a message, by its name in it, and its unit if the message gives one.
+
+    `called` is the element's name, if it has one. A `text` in a number's place has the number NaN.
+    """
 
     name: str
     number: float
     called: str = ""
+    unit: str = ""
+    text: str = ""
 
 
 def _columns(topic: str, rows: list[dict[str, _Value]]) -> list[Found]:
@@ -90,6 +95,8 @@ def _columns(topic: str, rows: list[dict[str, _Value]]) -> list[Found]:
     columns = []
     for name in names:
         found = [row.get(name) for row in rows]
+        if all(each is None or each.text for each in found):
+            continue
         values = as_numbers([np.nan if each is None else each.number for each in found])
         if values is None:
             continue
@@ -100,7 +107,11 @@ def _columns(topic: str, rows: list[dict[str, _Value]]) -> list[Found]:
             refused = f"is {first} in one message and {other} in another: give it by its name, as"
             array, _, field = name.rpartition("[")
             refused += f" {topic}.{array}[{first}]{field.partition(']')[2]}"
-        unit = "ns" if name in (STAMPS, "publish_time") or name.endswith(".stamp") else ""
+        for row, each in enumerate(found, start=1):
+            if each is not None and each.text:
+                refused = refused or f"message {row} of {topic} holds {each.text!r}, not a number"
+        units = {each.unit for each in found if each is not None}
+        unit = units.pop() if len(units) == 1 else ""
         values = values[:0] if refused else values
         columns.append(Found(f"{topic}.{name}", values, unit, topic, stamps, refused))
     return columns
@@ -111,12 +122,15 @@ def _values(value: Any, name: str, depth: int, labels: Labels) -> Iterator[_Valu
     if isinstance(value, (bool, int, float)):
         yield _Value(name, value)
         return
+    if isinstance(value, str) and value.casefold() != "nan":
+        yield _Value(name, np.nan, text=shown(value, 40) or "''")
+        return
     if depth > DEEPEST or isinstance(value, (str, bytes)):
         return
     if (fields := _fields(value)) is not None:
         if set(fields) in TIMES:
             s, ns = (int(fields[key]) for key in sorted(fields, key=len))
-            yield _Value(name, 1_000_000_000 * s + ns)
+            yield _Value(name, 1_000_000_000 * s + ns, unit="ns")
             return
         labels = (*_labels(fields), *labels)
         for key, inner in fields.items():
