@@ -89,7 +89,8 @@ def lay_grid(
     rounding_s = _rounding(time_s)
     rate, median_s = (time_s.size - 1) / float(np.ptp(time_s)), float(np.median(np.diff(time_s)))
     if not clock.frame_rate:
-        _check_rate(log, clock, 1.0 / median_s)
+        key = f"clock.{'unit' if clock.source else 'rate_Hz'}"
+        check_rate(log, clock, median_s, key, "give clock.frame_rate_Hz")
     wished = clock.frame_rate or frame_rate_Hz
     even = _frames_at(time_s - start_s, wished, rounding_s) if wished else None
     if wished is None:
@@ -191,16 +192,13 @@ def _frames_at(time_s: Floats, rate: float, rounding_s: float) -> Rows | None:
     return frame.astype(np.int64)
 
 
-def _check_rate(log: Log, clock: Clock, rate: float) -> None:
-    """Refuse an implausible rate of rows, which shows a wrong unit of time."""
+def check_rate(log: Log, clock: Stamped, step_s: float, key: str, remedy: str) -> None:
+    """Refuse an implausible interval of rows, which shows a wrong unit of time in `key`."""
+    rate = 1.0 / step_s
     if LEAST_RATE_Hz <= rate <= MOST_RATE_Hz:
         return
-    key = "unit" if clock.source else "rate_Hz"
-    problem = (
-        f"its rows come at {rate:.3g} Hz, outside {LEAST_RATE_Hz:g} to {MOST_RATE_Hz:g} Hz: is"
-    )
-    problem += f" clock.{key} right? If so, give clock.frame_rate_Hz"
-    raise InputError(log.file, clock.source, problem)
+    problem = f"its rows come at {rate:.3g} Hz, outside {LEAST_RATE_Hz:g} to {MOST_RATE_Hz:g} Hz"
+    raise InputError(log.file, clock.source, f"{problem}: is {key} right? If so, {remedy}")
 
 
 def _own_rate(

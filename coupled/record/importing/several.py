@@ -12,7 +12,14 @@ from pathlib import Path
 import numpy as np
 
 from coupled.errors import InputError, nearest
-from coupled.record.importing.clock import EVEN_frames, Grid, beside, lay_grid, stamps_of
+from coupled.record.importing.clock import (
+    EVEN_frames,
+    Grid,
+    beside,
+    check_rate,
+    lay_grid,
+    stamps_of,
+)
 from coupled.record.importing.mapping import Clock, LogMap, OtherClock
 from coupled.record.importing.reading import Log, Stamps, read_log
 from coupled.record.importing.rows import use_rows
@@ -156,6 +163,11 @@ def lay_grids(
     gap = log_map.clock.longest_gap
     for name in others:
         clock, key = clock_of(logs[name], log_map), _key(logs[name], log_map)
+        own = log_map.clocks[name].unit if name in log_map.clocks else ""
+        # Otherwise the unit is that of the first log, or s.
+        if not (own or clock.date or logs[name].units.get(clock.source)):
+            step_s = float(np.median(np.diff(stamps[name].from_first_s)))
+            check_rate(logs[name], clock, step_s, f"{key}.unit", f'set clocks."{name}".unit')
         time_s = np.asarray(
             stamps[name].from_first_s + (first_s[name] - first_s[main] - grid.account.start_s)
         )

@@ -115,6 +115,27 @@ def test_a_further_logs_clock_may_be_another(tmp_path: Path) -> None:
     assert np.max(np.abs(record["column_computed_m"] - 0.03 * np.sin(2 * record.time_s))) < 5e-6
 
 
+def test_the_unit_of_a_further_logs_times_is_doubted_until_it_is_stated(tmp_path: Path) -> None:
+    """Stamps in ms, read as s, were two rows within the record, and a line between them."""
+    files = two_logs(tmp_path)
+    lines = files[0].read_text().splitlines()[1:]
+    seconds = [f"{k / 60.0},{line.partition(',')[2]}" for k, line in enumerate(lines)]
+    files[0].write_text("stamp,pull\n" + "\n".join(seconds))
+    rows = [f'{1e3 * k / 97.0},"[0, {30 * np.sin(2 * k / 97.0):.6f}]"' for k in range(500)]
+    files[1].write_text("stamp,positions\n" + "\n".join(rows))
+    in_s = TWO.replace('"us"', '"s"')
+    (tmp_path / "map.toml").write_text(in_s)
+    with pytest.raises(InputError, match=r"state.csv: stamp: its rows come at 0\.097 Hz.*unit"):
+        import_log(files, tmp_path / "map.toml")
+    clock = '\n[clocks."state.csv"]\nfrom = "stamp"\nunit = '
+    (tmp_path / "map.toml").write_text(f'{in_s}{clock}"s"\n')
+    with pytest.raises(InputError, match="has fewer than two numbers in this span"):
+        import_log(files, tmp_path / "map.toml")
+    (tmp_path / "map.toml").write_text(f'{in_s}{clock}"ms"\n')
+    record, _ = import_log(files, tmp_path / "map.toml")
+    assert np.max(np.abs(record["column_computed_m"] - 0.03 * np.sin(2 * record.time_s))) < 5e-6
+
+
 @pytest.mark.parametrize(
     ("date", "form"),
     [
