@@ -20,6 +20,7 @@ import numpy as np
 from coupled.errors import InputError
 from coupled.files import open_file
 from coupled.record.importing.mapping import CHANNELS, Channel, Clock, Layout, LogMap
+from coupled.record.importing.reading import format_of
 
 LOOKED_AT_bytes = 2**17  # of a file, which contain its head
 ANGLES = ("pitch_rad", "alpha_rad")
@@ -112,13 +113,14 @@ class _Head:
 def known_map(path: Path) -> tuple[str, LogMap]:
     """Return the program that wrote a log, and the map of its columns.
 
-    Raises InputError if the head or all of its columns are unknown.
+    Raises InputError if the head, the format or all of its columns are unknown.
     """
     with open_file(path) as file:
         text = file.read(LOOKED_AT_bytes).decode("utf-8-sig", "replace")
     line = next((line for line in text.splitlines() if line.strip()), "")
     found = _head(line)
     if found is None:
+        format_of(path)  # no map reads a log of an unknown format
         problem = "its head is not JSBSim's, FlightGear's or X-Plane's: give --map, or --suggest"
         raise InputError(path, "", f"{problem} to have one proposed")
     head, names = found

@@ -198,12 +198,18 @@ def _counted(count: pl.Series, per_s: int) -> Stamps:
     return Stamps(Fraction(origin, per_s), steps / per_s)
 
 
+def format_of(path: Path) -> str:
+    """Return the format of a log by its extension. Raises InputError if that is unknown."""
+    kind = FORMATS.get(path.suffix.lower())
+    if kind is None:
+        problem = f"its format is not known; export it as one of {', '.join(FORMATS)}, or give"
+        raise InputError(path, "", f"{problem} log.format in the map")
+    return kind
+
+
 def read_log(path: Path, layout: Layout) -> Log:
     """Return the columns of a log in the format of the map or of the file's extension."""
-    kind = layout.format or FORMATS.get(path.suffix.lower())
-    if kind is None:
-        known = ", ".join(FORMATS)
-        raise InputError(path, "", f"its format is not known; {known}, or log.format in the map")
+    kind = layout.format or format_of(path)
     content = read_bytes(path)
     if kind == "csv":
         return _read_csv(path, content, layout)

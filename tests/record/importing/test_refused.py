@@ -11,6 +11,7 @@ import pytest
 from scipy import io as scipy_io
 
 from coupled.errors import InputError
+from coupled.record.importing.heads import known_map
 from tests.support.logs import (
     GOOD,
     LINES,
@@ -94,6 +95,13 @@ def test_a_file_that_is_not_a_log_is_refused_in_one_line(tmp_path: Path, case: s
     assert says in str(refusal.value)
     assert "\n" not in str(refusal.value)
     assert len(str(refusal.value)) < 500
+
+
+def test_a_log_of_an_unknown_format_needs_another_format_not_a_map(tmp_path: Path) -> None:
+    """The advice to give --map, or --suggest, ended in a second refusal."""
+    (tmp_path / "log.xlsx").write_bytes(b"PK\x03\x04" + bytes(200))
+    with pytest.raises(InputError, match="its format is not known; export it as one of"):
+        known_map(tmp_path / "log.xlsx")
 
 
 MAPS: dict[str, tuple[str, str, str]] = {
