@@ -167,13 +167,14 @@ def named(flight: Flight) -> str:
 def remarks(flights: Sequence[Flight], system: System = "si") -> list[str]:
     """Return explanations of a comparison's figures, a sentence each; flights of all cases.
 
-    They cover a K̂ of 0, hand forces that move no loader, surfaces at their stops, the loss of
-    authority under a force that moves the surface as far as on the rigid rig, and the numbers of
-    the rig that are guesses.
+    They cover a K̂ of 0, hands at rest, hand forces that move no loader, surfaces at their stops,
+    the loss of authority under a force that moves the surface as far as on the rigid rig, and the
+    numbers of the rig that are guesses.
     """
     cases = cases_of(flights)
     held = next(filter(None, (explain_loss(case, system) for case in cases)), "")
-    said = [_without_correction(flights), *_resting(cases, system), *_saturated(cases), held]
+    said = [_without_correction(flights), *_idle(cases), *_resting(cases, system)]
+    said += [*_saturated(cases), held]
     said.append(guessed(flights))
     return list(filter(None, said))
 
@@ -221,6 +222,16 @@ def _says_no_correction(manoeuvre: Manoeuvre, names: Sequence[str]) -> str:
         f" is {bend:.4g} {d}/N. Give controls.{control}.compensation.bend_{d}_per_N, which"
         " `coupled calibrate` finds."
     )
+
+
+def _idle(cases: Sequence[Sequence[Flight]]) -> Iterator[str]:
+    """Yield a sentence on each case without a force or motion of the hand, if any."""
+    for case in cases:
+        some = [f for f in case if math.isnan(f.outcome.force_N) and not f.outcome.ended_early]
+        if some:
+            control = some[0].manoeuvre.control
+            where = _where(cases, case, some)
+            yield f"No hand moves or loads the {control}{where}, so nothing is measured."
 
 
 def _resting(cases: Sequence[Sequence[Flight]], system: System) -> Iterator[str]:

@@ -47,6 +47,14 @@ def pulled(deflection_m: float, **terms: Any) -> Comparison:
     return compare([replace(case, pilots={"column": pilot}, **terms)])
 
 
+def test_a_hand_at_rest_is_stated_under_the_empty_table() -> None:
+    """The table was empty, without a reason."""
+    idle = Manoeuvre(bench(), {"column": coupled.Step(force_N=0.0)}, 1.0, bench=STATIC)
+    assert compare([idle]).remarks() == [
+        "No hand moves or loads the column, so nothing is measured."
+    ]
+
+
 def held_rad(flight: Flight) -> float:
     """Return the elevator's mean position about trim while the column is held, rad."""
     elevator, time_s = flight.record["elevator_rad"], flight.record.time_s
