@@ -80,6 +80,8 @@ class Rule:
 
 
 RULES = (
+    Rule("needed", "search.beam:Beam._needed", gives(frozenset()),
+         "an effect whose interval includes neutral is kept if all simpler sets lose by 5"),
     Rule("contact_once", "search.beam:_contact_values", gives({}),
          "laws of friction start from presliding parameters fitted before"),
     Rule("last_swaps", "search.beam:_sets_with_swap", gives([]),
@@ -93,6 +95,13 @@ RULES = (
     Rule("efficient_score", "search.screen:Screen._worth_a_fit",
          lambda original, *args, refitted=False: [] if refitted else original(*args),
          "a candidate is also screened by what the present effects cannot make of it"),
+    Rule("doubtful", "search.screen:Screen.best",
+         lambda original, screen, current, candidates, worth, *args, **options:
+             original(screen, current, candidates, worth, *args, **options) if worth.least else [],
+         "if no candidate is worth a fit beside the best set, a few are fitted all the same",
+         "_fit_neighbours"),
+    Rule("initial_contact", "search.problem:Problem.with_initial_contact", gives(None),
+         "without effects, screening also takes presliding parameters at their initial values"),
     Rule("refined", "search.screen:Screen._signature", gives([]),
          "candidates are also screened at larger and at projected sizes", "_refine_one"),
     Rule("smooth_error", "search.problem:ModelError.smooth",
@@ -100,7 +109,7 @@ RULES = (
          "the model error is as smooth as the gap of which it is a share", fresh=True),
     Rule("tolerance", "search.problem:Problem.within_tolerance", second,
          "effects are screened with nuisance parameters within their tolerance",
-         "_fit_neighbours"),
+         "_worth_a_fit"),
     Rule("noise_explains", "search.beam:Beam.open_outputs", gives({""}),
          "where noise explains all, no effect is the answer unless it is excluded", "_choose"),
     Rule("own_trim", "search.fit:_with_trim", gives(None),

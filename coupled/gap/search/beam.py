@@ -42,6 +42,7 @@ from coupled.gap.thresholds import (
     RIVAL_GAIN,
     SHOOTINGS,
     TRIES,
+    VERY_STRONG,
 )
 from coupled.parallel import in_threads
 
@@ -122,18 +123,45 @@ class Beam:
         return self.known[names].log(self.counts)
 
     def valid(self) -> list[Names]:
-        """Return the admissible sets (`is_admissible`).
+        """Return the admissible sets (`is_admissible`), those of fewest parameters first.
 
         If no admissible set has more evidence than no effect, sets are admissible although the
         interval of a size contains the neutral value, if they have.
         """
-        valid = [n for n, fit in self.fits.items() if not n or is_admissible(self.problem, fit)]
+        valid = list[Names]()
+        for names in sorted(self.fits, key=lambda one: _numbers(self.fits[one])):
+            fitted = self.fits[names]
+            if not names or is_admissible(self.problem, fitted, self._needed(fitted, valid)):
+                valid.append(names)
         if not len(self.counts):
             return valid
         gained = [n for n in self.fits if n and self.log(n) > self.log(frozenset())]
         if not any(names in gained for names in valid):
-            valid += [n for n in gained if is_admissible(self.problem, self.fits[n], sized=False)]
+            valid += [n for n in gained if is_admissible(self.problem, self.fits[n], n)]
         return valid
+
+    def _needed(self, fitted: Fit, valid: Sequence[Names]) -> Names:
+        """Return the effects of a set that no simpler admissible set can do without.
+
+        The interval by slopes of such an effect may contain the neutral value where dry friction
+        makes the residual discontinuous; the evidence is then the better test. It must be very much
+        higher than that of each set of fewer parameters without the effect, and without a law that
+        contains it.
+        """
+        if not len(self.counts):
+            return frozenset()
+        numbers, here = _numbers(fitted), self.log(names_of(fitted.effects))
+        simpler = [n for n in valid if _numbers(self.fits[n]) < numbers]
+
+        def is_needed(effect: Effect) -> bool:
+            without = (
+                self.log(names)
+                for names in simpler
+                if not any(e is effect or contains(e, effect) for e in self.fits[names].effects)
+            )
+            return here - max(without, default=here) > VERY_STRONG
+
+        return frozenset(effect.name for effect in fitted.effects if is_needed(effect))
 
     def ranked(self) -> list[Names]:
         """Return the admissible sets, the one of highest evidence first."""
@@ -190,15 +218,15 @@ def names_of(effects: Iterable[Effect]) -> Names:
     return frozenset(effect.name for effect in effects)
 
 
-def is_admissible(problem: Problem, fitted: Fit, sized: bool = True) -> bool:
+def is_admissible(problem: Problem, fitted: Fit, needed: Names = frozenset()) -> bool:
     """Tell whether a fit is admissible.
 
-    The interval of each effect's size excludes the neutral value, if they should be `sized`, no
+    The interval of each effect's size excludes the neutral value, unless the effect is `needed`, no
     parameter is at a bound, and no frequency is above the Nyquist frequency.
     """
     fastest = 0.5 * min(output.frame_rate_Hz for output in problem.outputs)
     for effect in fitted.effects:
-        if sized and not _excludes_neutral(problem.case, fitted, effect):
+        if effect.name not in needed and not _excludes_neutral(problem.case, fitted, effect):
             return False
         for p in effect.free:
             key = effect.value_key(p)
@@ -297,6 +325,11 @@ def _fit_neighbours_of_best(beam: Beam, library: Sequence[Effect]) -> None:
         _finish(beam)
 
 
+def _numbers(fitted: Fit) -> int:
+    """Return how many parameters a set's effects have."""
+    return sum(len(effect.free) for effect in fitted.effects)
+
+
 def _fit_with_simpler_law(beam: Beam, law: Effect) -> Fit | None:
     """Return the best fit with an effect of fewer parameters in place of a law of the best set.
 
@@ -316,24 +349,25 @@ def _fit_with_simpler_law(beam: Beam, law: Effect) -> Fit | None:
 def _fit_neighbours(beam: Beam, fitted: Fit, library: Sequence[Effect], wanted: set[str]) -> None:
     """Fit the neighbours of a fitted set, with effects that show in the `wanted` outputs.
 
-    They are screened with nuisance parameters within their tolerance: beyond it these may have
-    absorbed an effect.
     The candidate of the largest predicted gain is fitted first. If it explains the outputs, others
     are fitted only if they may do better; otherwise all are, since a prediction may show a small
-    part of a large gain. A law that contains another law is fitted after it, from its optimum, if
-    the best set leaves an output unexplained. Laws of dry friction start from presliding parameters
-    that were fitted before.
+    part of a large gain. If none is worth a fit beside the best set, a few are fitted all the same:
+    the gain of a law whose shape is far from that of its start cannot be predicted. A law that
+    contains another law is fitted after it, from its optimum, if the best set leaves an output
+    unexplained. Laws of dry friction start from presliding parameters that were fitted before.
     """
     found, is_best = fitted, names_of(fitted.effects) == beam.best
-    fitted, many = beam.problem.within_tolerance(found), BEAM_CANDIDATES if is_best else TRIES
     beside = _candidates(found.effects, library, wanted)
-    screened = beam.screen.best(fitted, beside, beam.worth(found), many, anew=is_best)
+    fitted, screened = _worth_a_fit(beam, found, beside)
+    doubtful = is_best and not screened
+    if doubtful:
+        screened = beam.screen.best(fitted, beside, Worth(0.0, beam.counts), TRIES)
     effects = [one.effect for one in screened]
     plain = [one for one in screened if not any(contains(one.effect, e) for e in effects)]
     ends = list[Fit]()
     for some in (plain[:1], plain[1:]):
         still = some
-        if not (beam.best and beam.open_outputs(beam.best) & wanted):
+        if not (doubtful or (beam.best and beam.open_outputs(beam.best) & wanted)):
             still = beam.screen.still_worth(fitted, some, beam.worth(found, MOST))
         dry = next((one for one in still if one.effect.dry), None)
         if dry is not None and not beam.contact:
@@ -355,6 +389,34 @@ def _fit_neighbours(beam: Beam, fitted: Fit, library: Sequence[Effect], wanted: 
     if len(fitted.effects) > 1:
         others += [*_sets_with_swap(beam, fitted, library), *_sets_without_one(fitted)]
     _fit_sets(beam, others)
+
+
+def _worth_a_fit(
+    beam: Beam, found: Fit, candidates: Sequence[Effect]
+) -> tuple[Fit, list[Screened]]:
+    """Return the candidates worth a fit beside a set, and the set as it is beside them.
+
+    Its nuisance parameters are within their tolerance: beyond it they may have absorbed an effect.
+    The presliding parameters of a filed friction have no tolerance. Without effects the candidates
+    are also screened with their initial values, and the screen that predicts more is used.
+    """
+    problem, is_best = beam.problem, names_of(found.effects) == beam.best
+    many = BEAM_CANDIDATES if is_best else TRIES
+    fitted = problem.within_tolerance(found)
+    screened = beam.screen.best(fitted, candidates, beam.worth(found), many, anew=is_best)
+    initial = None if found.effects else problem.with_initial_contact(fitted)
+    if initial is None:
+        return fitted, screened
+    # What does not show in the loader does not depend on its contact.
+    apart = {e.name for e in candidates if "loader" not in e.shows_in}
+    same = {name: known for name, known in beam.screen.known.items() if name in apart}
+    screen = Screen(problem, beam.error, same)
+    others = screen.best(initial, candidates, beam.worth(initial), many)
+    most, more = (max((one.gain for one in some), default=0.0) for some in (screened, others))
+    if more - beam.behind(initial) <= most:
+        return fitted, screened
+    beam.screen = screen
+    return initial, others
 
 
 def _fit_by_multiple_shooting(beam: Beam) -> None:

@@ -143,6 +143,13 @@ class Problem:
         }
         return found if rig is None else replace(found, values=values, rig=rig, groups=groups)
 
+    def with_initial_contact(self, found: Fit) -> Fit | None:
+        """Return a fit with its presliding parameters at their initial values; None if they are."""
+        keys = {one.value_key(p) for one in self.case.contact for p in one.free}
+        values = {**found.values, **{k: self.case.neutral[k] for k in keys & found.values.keys()}}
+        rig = None if values == found.values else self.rig_of(found.effects, values)
+        return None if rig is None else replace(found, values=values, rig=rig)
+
     def without_colour_allowance(self, root: Rig) -> Problem:
         """Return the problem without the allowance for noise colour (`Case`)."""
         anew = Problem(self.case.without_colour_allowance(root))
