@@ -141,9 +141,9 @@ class Curves:
     def better_than(self, names: Sequence[str]) -> str:
         """Return a sentence on those of some effects that the curves describe better."""
         ours = joined([plain(name) for name in names if name in self.instead])
-        it, is_one = ("It", "one") if len(self.found) == 1 else ("They", "them")
-        describe = "describes" if len(self.found) == 1 else "describe"
-        return f"{it} {describe} the gap better than {ours}, which may only approximate {is_one}."
+        if len(self.found) > 1:
+            return f"They describe the gap better than {ours}, which may only approximate them."
+        return f"It describes the gap better than {ours}, which may only approximate it."
 
     def probable(self, effect: EffectResult) -> EffectResult:
         """Return an effect with the probability that it has beside the curves."""
