@@ -110,6 +110,8 @@ RULES = (
     Rule("tolerance", "search.problem:Problem.within_tolerance", second,
          "effects are screened with nuisance parameters within their tolerance",
          "_worth_a_fit"),
+    Rule("determined", "search.beam:_determined", lambda original, beam, ranked: ranked[0],
+         "of alternatives below half, the first whose sizes are determined is reported"),
     Rule("noise_explains", "search.beam:Beam.open_outputs", gives({""}),
          "where noise explains all, no effect is the answer unless it is excluded", "_choose"),
     Rule("own_trim", "search.fit:_with_trim", gives(None),

@@ -626,7 +626,7 @@ def _choose(beam: Beam, rounds: tuple[dict[str, float], ...]) -> Choice:
     logs = np.array([beam.log(names) for names in ranked])
     weights = np.exp(logs - logs[0])
     weights /= weights.sum()
-    best = beam.best
+    best = beam.best if weights[0] > MOST else _determined(beam, ranked)
     if not beam.open_outputs(frozenset()) and (
         beam.log(frozenset()) > logs[0] - GIVEN_UP
         or not all(effect.of for effect in beam.fits[best].effects)
@@ -661,6 +661,13 @@ def _choose(beam: Beam, rounds: tuple[dict[str, float], ...]) -> Choice:
         rounds,
         float(weights[ranked.index(best)]),
     )
+
+
+def _determined(beam: Beam, ranked: Sequence[Names]) -> Names:
+    """Return the first set near the best whose sizes are determined; if there is none, the best."""
+    near = [names for names in ranked if beam.log(names) > beam.log(ranked[0]) - RIVAL_GAIN]
+    sure = (names for names in near if names and is_admissible(beam.problem, beam.fits[names]))
+    return next(sure, ranked[0])
 
 
 def _replaces(best: Names, other: Names, effect: Effect) -> bool:
