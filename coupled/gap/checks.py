@@ -354,14 +354,16 @@ def rig_of_manifests(records: Mapping[str, Record]) -> Rig:
 def trimmed(rig: Rig, records: Mapping[str, Record]) -> tuple[dict[str, Rig], str]:
     """Return the rig in the trim at the start of each record, and sentences about the changes.
 
-    A record without a sentence starts in the rig file's trim. Raises InputError if a manifest has
-    another aircraft, or if the aircraft cannot be trimmed at a record's start.
+    A record without a sentence starts in the rig file's trim; one that does not show its trim, in
+    that of the first record that does. Raises InputError if a manifest has another aircraft, or if
+    the aircraft cannot be trimmed at a record's start.
     """
-    found, said = dict[str, Rig](), dict[str, str]()
-    for file, record in records.items():
-        found[file] = rig
-        if rig.flight is None:
-            continue
+    found, said = dict.fromkeys(records, rig), dict[str, str]()
+    if rig.flight is None:
+        return found, ""
+    shown = [file for file, record in records.items() if _shows_trim(rig.flight, record, file)]
+    for file in shown:
+        record = records[file]
         taken, source = _manifest_trim(rig.flight, record, file), f"the manifest of {file}"
         if taken is None:
             taken, source = _measured_trim(rig, record, file), f"the first rows of {file}"
@@ -370,7 +372,14 @@ def trimmed(rig: Rig, records: Mapping[str, Record]) -> tuple[dict[str, Rig], st
             found[file] = rig.changed({f"flight.{key}": value for key, value in new.items()})
             was = ", ".join(_change(rig.flight, key, value) for key, value in new.items())
             said.setdefault(was, f"Trim taken from {source}, not from the rig file: {was}.")
+    if shown:
+        found |= {file: found[shown[0]] for file in records if file not in shown}
     return found, " ".join(said.values())
+
+
+def _shows_trim(flight: Flight, record: Record, file: str) -> bool:
+    """Tell whether a record or its manifest shows the trim that it was flown from."""
+    return SPEED in record or _manifest_trim(flight, record, file) is not None
 
 
 def trim_in(rig: Rig, other: Rig) -> dict[str, Any]:
@@ -485,14 +494,15 @@ def _climbs(record: Record, angle: float) -> bool:
 def unmeasured_trim(rig: Rig, records: Mapping[str, Record]) -> str:
     """Return a sentence on a trim that a record and its manifest do not show; empty if they do."""
     flight = rig.flight
-    if flight is None or all(
-        SPEED in record or _manifest_trim(flight, record, file) is not None
-        for file, record in records.items()
-    ):
+    if flight is None:
         return ""
+    shown = [file for file, record in records.items() if _shows_trim(flight, record, file)]
+    if len(shown) == len(records):
+        return ""
+    filed = f"{CALIBRATED} {flight.calibrated_airspeed:.4g}, {ALTITUDE} {flight.altitude:.4g}"
+    trim = f"that of {shown[0]}" if shown else f"the rig file's: {filed}"
     return (
-        f"Without {SPEED} the trim is the rig file's: {CALIBRATED} {flight.calibrated_airspeed:.4g}"
-        f", {ALTITUDE} {flight.altitude:.4g}. A flight from another one differs as by mass and "
+        f"Without {SPEED} the trim is {trim}. A flight from another one differs as by mass and "
         "inertias."
     )
 

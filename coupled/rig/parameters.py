@@ -419,7 +419,7 @@ class Flight(Section):
     dihedral_effect: float = quantity("", 1.0, ge=-10, le=10)
     directional_stability: float = quantity("", 1.0, ge=-10, le=10)
     adverse_yaw: float = quantity("", 1.0, ge=-10, le=10)
-    lift_slope: float = quantity("", 1.0, ge=-10, le=10)
+    lift_slope: float = quantity("", 1.0, ge=0, le=10)
     side_force_slope: float = quantity("", 1.0, ge=-10, le=10)
     drag: float = quantity("", 1.0, ge=0, le=10)
     thrust: float = quantity("", 1.0, ge=0, le=10)

@@ -6,12 +6,13 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import coupled as api
 from coupled.errors import InputError
 from coupled.flight.runfile import read_run
-from coupled.gap.checks import trimmed
+from coupled.gap.checks import trimmed, unmeasured_trim
 from coupled.record.record import Record, manifest_path, write_record
 from coupled.rig.rig import Rig
 from tests.support import threecontrols
@@ -154,6 +155,21 @@ def test_each_record_is_flown_from_its_own_trim(faster: float) -> None:
     found = api.diagnose(rig, flown(0.7))
     assert [effect.name for effect in found.effects] == ["roll_damping"]
     assert found.effects[0].value == pytest.approx(0.7, rel=0.01)
+
+
+def test_a_record_that_lacks_its_airspeed_is_flown_from_the_trim_of_another(
+    slow_737: Record, filed: Rig
+) -> None:
+    """It was flown from the rig file's trim beside records of another one: a gap of 856 floors."""
+    kept = [name for name in slow_737.channels if name != "true_airspeed_m_per_s"]
+    blind = Record(tuple(kept), np.column_stack([slow_737[name] for name in kept]))
+    records = {"a": bare(slow_737), "b": blind}
+    for order in (("a", "b"), ("b", "a")):
+        trims, said = trimmed(filed, {file: records[file] for file in order})
+        assert trims["b"] == trims["a"] != filed
+        assert said.startswith("Trim taken from the first rows of a,")
+    assert "the trim is that of a. " in unmeasured_trim(trims["a"], records)
+    assert trimmed(filed, {"b": blind}) == ({"b": filed}, "")
 
 
 def test_the_help_pages_example_runs_on_the_guides_record(tmp_path: Path, slow_737: Record) -> None:
