@@ -12,8 +12,11 @@ from scipy.interpolate import PchipInterpolator
 
 import coupled
 from coupled.errors import InputError
+from coupled.gap.chain import Part
 from coupled.gap.checks import check_record, clipped, not_measured
-from coupled.gap.diagnose import diagnose
+from coupled.gap.diagnose import diagnose, findings
+from coupled.gap.prepare import prepare
+from coupled.gap.search.beam import search_sets
 from coupled.gap.signals.live import live_of
 from coupled.record.channels import ControlName
 from coupled.record.importing.plausible import drives_the_hand, held
@@ -213,3 +216,20 @@ def test_a_motion_of_another_sign_is_refused(flown: Record, name: str, against: 
 @pytest.mark.slow
 def test_a_motion_of_the_models_sign_is_judged(flown: Record) -> None:
     assert diagnose(nominal_rig(True), {"r.csv": flown}, "column").verdict == "no_gap"
+
+
+def test_a_repeating_sensor_is_no_alternative_to_an_effect_that_explains_nothing(
+    tmp_path: Path,
+) -> None:
+    """A dead zone of the transducer was ambiguous, beside a bend of probability 4e-5."""
+    rig = nominal_rig(True)
+    record = made(tmp_path, rig, {}, 31)
+    data, at = record.data.copy(), record.channels.index("column_deflection_m")
+    data[:, at] -= np.clip(data[:, at], -2e-3, 2e-3)
+    dead = {"r": Record(record.channels, data, record.manifest)}
+    prepared = prepare(rig, dead, Part("column"))
+    assert prepared.by_recorder
+    library = [effect for effect in prepared.library if effect.name == "bend"]
+    found = findings(prepared, *search_sets(prepared.case, library))
+    assert [effect.name for effect in found.effects] == ["bend"]
+    assert found.verdict == "unexplained"
