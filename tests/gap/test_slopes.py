@@ -81,8 +81,8 @@ def test_a_smooth_residual_that_goes_otherwise_than_its_slopes_say_is_asked_anew
 
 def test_the_slopes_of_many_frames_are_not_kept() -> None:
     x = np.zeros(5)
-    assert Slope(x, np.zeros(40_000), np.zeros((40_000, 5))).kept() is not None
-    assert Slope(x, np.zeros(60_000), np.zeros((60_000, 5))).kept() is None
+    assert Slope(x, np.zeros(160_000), np.zeros((160_000, 5))).kept() is not None
+    assert Slope(x, np.zeros(240_000), np.zeros((240_000, 5))).kept() is None
 
 
 def test_an_equal_flight_is_flown_once_and_one_that_does_not_trim_is_not_tried_again() -> None:

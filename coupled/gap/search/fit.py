@@ -121,7 +121,10 @@ def _remembered(
     parent: Fit | None,
     part: Part,
 ) -> Group:
-    """Return a fit from the cache; a fit that starts at the optimum of another one is that fit."""
+    """Return a fit from the cache; a fit that starts at the optimum of another one is that fit.
+
+    The cache keeps no Jacobian, since they are large; that of a fit that ended here is in `descent`.
+    """
     ours, known = touched(case.outputs, members), descent.known
     if descent.most < WHOLE.most and parent is not None:
         descent = replace(descent, held=_held(case, ours, _free(members)[0], parent))
@@ -131,10 +134,12 @@ def _remembered(
     what = (tuple(members), coarse, descent.most, part)
     key = (*what, tuple(map(tuple, _starts(members, start))))
     if key not in known:
-        known[key] = found = _fit(case, ours, members, priors, start, descent, part)
-        known[*what, (tuple(found.values.values()),)] = found
+        found = _fit(case, ours, members, priors, start, descent, part)
+        small = replace(found, slope=None)
+        known[key] = known[*what, (tuple(found.values.values()),)] = small
+        return found
     held: Group = known[key]
-    return held
+    return replace(held, slope=descent.slopes.get(tuple(held.values)))
 
 
 def _held(case: Case, ours: Sequence[Output], keys: Sequence[str], parent: Fit) -> Floats | None:
