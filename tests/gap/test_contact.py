@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from coupled.gap.diagnose import diagnose
 from coupled.gap.search.case import allowing_for_contact, contact_start
 from coupled.gap.signals.output import Output
 from coupled.gap.thresholds import FAULTY_FROM, MISMATCH
+from tests.support import gaps
 from tests.support.rigs import bench
 
 
@@ -65,3 +68,16 @@ def test_how_filed_friction_yields_is_known_as_well_as_an_effects_physics(
     gap = Output(stage, "x", np.full(2400, 21.0), lambda rig: np.zeros(2400), 1.0, 120.0)
     found = allowing_for_contact(gap, rig, "column")
     assert found.limit == pytest.approx(1.0 + 20.0 * MISMATCH if allowed else FAULTY_FROM)
+
+
+@pytest.mark.slow
+def test_a_long_record_of_a_rigid_contact_has_no_presliding(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The shortest length that is fitted was significant, by the interval of so many frames."""
+    monkeypatch.setattr(gaps, "LONG_s", 240.0)
+    nominal = gaps.nominal_rig(False)
+    record = gaps.made(tmp_path, nominal, {"coulomb_friction": {"friction_N": 3.0}}, 65)
+    (found,) = diagnose(nominal, {"r": record}).effects
+    assert found.name == "coulomb_friction"
+    assert found.parameters[0].value == pytest.approx(3.0, rel=0.02)

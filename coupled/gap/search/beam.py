@@ -222,7 +222,7 @@ def is_admissible(problem: Problem, fitted: Fit, needed: Names = frozenset()) ->
     """Tell whether a fit is admissible.
 
     The interval of each effect's size excludes the neutral value, unless the effect is `needed`, no
-    parameter is at a bound, and no frequency is above the Nyquist frequency.
+    parameter is at a bound, and no frequency may be above the Nyquist frequency.
     """
     fastest = 0.5 * min(output.frame_rate_Hz for output in problem.outputs)
     for effect in fitted.effects:
@@ -232,7 +232,7 @@ def is_admissible(problem: Problem, fitted: Fit, needed: Names = frozenset()) ->
             key = effect.value_key(p)
             if key in fitted.at_bound:
                 return False
-            if p.name == "frequency_Hz" and p.kind != "aliased" and fitted.values[key] >= fastest:
+            if p.name == "frequency_Hz" and p.kind != "aliased" and fitted.high[key] >= fastest:
                 return False
     return True
 
@@ -683,18 +683,19 @@ def _name_law_with_contact(beam: Beam, choice: Choice, library: Sequence[Effect]
     """Return a choice with presliding friction named, if its presliding length is not zero.
 
     Presliding parameters are nuisance parameters in the search (`distinct`). If the rig file has no
-    friction, and the 95 % interval of the presliding length excludes a rigid contact, the law that
-    includes these parameters replaces the law found.
+    friction, and the 95 % interval of the presliding length excludes a rigid contact, for which the
+    shortest length stands, the law that includes these parameters replaces the law found.
     """
     problem, fitted = beam.problem, choice.fit
     case = problem.case
     if not case.contact or is_dry(case.nominal, case.control):
         return choice
-    length = case.contact[0].value_key(case.contact[0].free[0])
+    (number,) = case.contact[0].free
+    length, shortest = case.contact[0].value_key(number), number.low
     kept = distinct(library, case.contact)
     for step in choice.steps:
         law = next((e for e in library if e not in kept and contains(e, step.effect)), None)
-        if law is None or fitted.low.get(length, 0.0) <= 0.0:
+        if law is None or fitted.low.get(length, shortest) <= shortest:
             continue
         numbers = {p: value_of(fitted.rig, case.control, p.key) for p in law.free}
         start = {law.value_key(p): float(value) for p, value in numbers.items()}
