@@ -23,6 +23,7 @@ import numpy as np
 from coupled.errors import InputError, nearest
 from coupled.flight.aircraft import make_aircraft
 from coupled.flight.altered import STILL
+from coupled.flight.everyframe import PROPERTIES
 from coupled.gap.signals.output import Floats, Output, estimate_noise
 from coupled.gap.signals.reading import PRESSURE
 from coupled.gap.stages.openloop import throttles_of
@@ -30,6 +31,7 @@ from coupled.gap.stages.surfaces import start_of, surface_channel, surface_point
 from coupled.gap.thresholds import (
     DOUBLED,
     FAR_SIGMAS,
+    KNOWN,
     MOST,
     NEGLIGIBLE,
     OTHER_SPEED,
@@ -599,10 +601,25 @@ def at_rate_of(rig: Rig, records: Mapping[str, Record]) -> Rig:
     return rig.changed({"frame_rate_Hz": float(f"{rate_Hz:.6g}"), "flight.steps_per_frame": steps})
 
 
-def check_moved_by_pilot(rig: Rig) -> None:
-    """Raise InputError if control laws of the model move its elevator."""
+def check_moved_by_pilot(rig: Rig, records: Mapping[str, Record]) -> None:
+    """Raise InputError if a recorded surface of an aircraft alone cannot drive the model.
+
+    Control laws of the model may move its elevator. Or the position of a surface, in the property
+    of that channel, does not follow its command, as if the model has the position elsewhere.
+    """
     assert rig.flight is not None
-    if surface_points(rig, "column") is None:
-        problem = "has control laws that move its elevator, which follow the column's command;"
-        remedy = "give a rig with [controls.column], and a record with column_estimate_m"
-        raise InputError(rig.name, "flight.model", f"{rig.flight.model} {problem} {remedy}")
+    model, key = rig.flight.model, "flight.model"
+    for control in CONTROL_NAMES:
+        name, points = surface_channel(control), surface_points(rig, control)
+        if points is None and control == "column":
+            problem = "has control laws that move its elevator, which follow the column's command;"
+            remedy = "give a rig with [controls.column], and a record with column_estimate_m"
+            raise InputError(rig.name, key, f"{model} {problem} {remedy}")
+        recorded = (file for file, one in records.items() if name in one and np.ptp(one[name]) > 0)
+        file = next(recorded, None)
+        if points is None or np.ptp(points[1]) > KNOWN or file is None:
+            continue
+        problem = f"{model} does not move {PROPERTIES[name]}, the position of {name} in {file};"
+        own = f"give a rig with [controls.{control}] and its surface_property"
+        remedy = own if control == "column" else f"{own}, or the record without {name}"
+        raise InputError(rig.name, key, f"{problem} {remedy}")

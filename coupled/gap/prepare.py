@@ -140,7 +140,7 @@ def prepare(
         if rig.flight is not None:
             check_trim(trim_speed(trims[file]), record, file)
     if not rig.controls:
-        check_moved_by_pilot(rig)
+        check_moved_by_pilot(rig, records)
     readers = readers_of(trims, records, control)
     judged = Judged(rig, part, readers, baseline)
     outputs = [

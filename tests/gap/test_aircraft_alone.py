@@ -15,6 +15,7 @@ from coupled.errors import InputError
 from coupled.gap.chain import Part
 from coupled.gap.checks import (
     at_rate_of,
+    check_moved_by_pilot,
     density_of,
     motion_alone,
     not_in_trim,
@@ -32,6 +33,7 @@ from coupled.gap.search.beam import search_sets
 from coupled.gap.search.histories import search
 from coupled.gap.stages.airframe import airframe_outputs
 from coupled.gap.stages.openloop import is_throttled
+from coupled.record.channels import SURFACES
 from coupled.record.importing.convert import import_log
 from coupled.record.record import Record
 from coupled.resources import shipped_rigs
@@ -344,3 +346,14 @@ def test_a_rudder_that_a_yaw_damper_moves_is_led_to_where_it_was_measured() -> N
     assert {"roll_rate_rad_per_s", "yaw_rate_rad_per_s"} <= {one.channel for one in outputs}
     assert "rudder_rad" not in {one.channel for one in outputs}
     assert all(one.gap(jet) < one.limit for one in outputs)
+
+
+def test_a_surface_whose_position_stays_at_rest_in_the_model_is_refused(healthy: Record) -> None:
+    flight = {"model": "T38", "altitude_m": 6096.0, "calibrated_airspeed_m_per_s": 205.8}
+    rig = alone().changed({f"flight.{key}": value for key, value in flight.items()})
+    with pytest.raises(InputError, match=r"T38 does not move fcs/elevator-pos-rad.* in log;"):
+        check_moved_by_pilot(rig, {"log": healthy})
+    still = healthy.data.copy()
+    still[:, [healthy.channels.index(f"{name}_rad") for name in SURFACES.values()]] = 0.0
+    check_moved_by_pilot(rig, {"log": Record(healthy.channels, still)})
+    check_moved_by_pilot(alone(), {"log": healthy})
