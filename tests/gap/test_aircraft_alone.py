@@ -33,7 +33,7 @@ from coupled.gap.search.beam import search_sets
 from coupled.gap.search.histories import search
 from coupled.gap.stages.airframe import airframe_outputs
 from coupled.gap.stages.openloop import is_throttled
-from coupled.record.channels import SURFACES
+from coupled.record.channels import LATERAL, SURFACES
 from coupled.record.importing.convert import import_log
 from coupled.record.record import Record
 from coupled.resources import shipped_rigs
@@ -346,6 +346,16 @@ def test_a_rudder_that_a_yaw_damper_moves_is_led_to_where_it_was_measured() -> N
     assert {"roll_rate_rad_per_s", "yaw_rate_rad_per_s"} <= {one.channel for one in outputs}
     assert "rudder_rad" not in {one.channel for one in outputs}
     assert all(one.gap(jet) < one.limit for one in outputs)
+
+
+def test_an_aircraft_whose_motion_is_within_its_noise_is_not_judged(healthy: Record) -> None:
+    data = healthy.data.copy()
+    data[:, 1:] = data[0, 1:] + 1e-3 * (data[:, 1:] - data[0, 1:])
+    quiet = without(Record(healthy.channels, data), *LATERAL)
+    found = diagnose(alone(), {"log": with_noise(quiet)})
+    assert (found.verdict, found.stage("airframe").judged) == ("ambiguous", False)
+    assert "Whether the airframe has a gap cannot be decided" in str(found.summary)
+    assert "shows little but noise" in found.stage("airframe").why
 
 
 def test_a_surface_whose_position_stays_at_rest_in_the_model_is_refused(healthy: Record) -> None:

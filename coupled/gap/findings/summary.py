@@ -114,7 +114,8 @@ def _what(found: Findings, floor: str) -> str:
     hidden = [stage for stage in found.stages if stage.hidden is not None]
     if hidden and not found.guilty:
         why = "; ".join(f"the {stage.name} is not judged, as {stage.why}" for stage in hidden)
-        return f"Whether the {found.control} has a gap cannot be decided: {why}."
+        where = AIRFRAME if all(stage.name == AIRFRAME for stage in hidden) else found.control
+        return f"Whether the {where} has a gap cannot be decided: {why}."
     if found.verdict == "ambiguous" and not found.guilty:
         return (
             f"Whether the {found.control} has a gap cannot be said: the rig does not explain the"

@@ -30,6 +30,7 @@ from coupled.gap.signals.floors import left_noise
 from coupled.gap.signals.output import (
     TRIM,
     CoarseRig,
+    HiddenGap,
     Output,
     estimate_noise,
     lasting,
@@ -415,7 +416,11 @@ def _output(
 
     loose, lasts = spread(errors, own, noise.memory, rate_Hz), lasting(errors, floor)
     given = (measured, predict, floor, rate_Hz, model.number, loose, moved_by / floor)
-    return Output("airframe", name, *given, errors=errors, lasts=lasts)
+    made = Output("airframe", name, *given, errors=errors, lasts=lasts)
+    if name in SLOW:  # they drift far with the phugoid, while all that damps the rates is hidden
+        return made
+    noisiest = "the surfaces" if moved_by > own else name
+    return replace(made, hidden_gap=HiddenGap(floor / float(np.std(measured)), noisiest, name))
 
 
 def _known_motion(rig: Rig, record: Record) -> tuple[str, ...]:
