@@ -19,6 +19,7 @@ The zero of an encoder is known no better than to one of its counts.
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -60,7 +61,16 @@ from coupled.gap.stages.openloop import not_judged
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points
 from coupled.gap.stages.tried import tried_effects, with_terms
-from coupled.gap.thresholds import FEW, FEW_FRAMES, MOST, NEGLIGIBLE, SHORT_FRAMES, SIGMAS
+from coupled.gap.thresholds import (
+    FEW,
+    FEW_FRAMES,
+    MOST,
+    NEGLIGIBLE,
+    SHORT_FRAMES,
+    SIGMAS,
+    TINY,
+    STEP_s,
+)
 from coupled.parallel import in_threads
 from coupled.record.channels import ControlName, channel, unit_of
 from coupled.record.record import Record
@@ -102,6 +112,40 @@ class Prepared:
         return ends[0] <= 1.0 / self.density <= ends[1]
 
 
+def finely_stepped(
+    trims: Mapping[str, Rig], records: Mapping[str, Record]
+) -> tuple[dict[str, Rig], str]:
+    """Return the rigs of an aircraft alone with the steps that fit, and a sentence on a change.
+
+    An aircraft moves continuously, and wide steps of its model act like an error of its damping and
+    of the time stamps. A log of a simulation may have a step per row. So steps wider than JSBSim's
+    own are compared with finer ones by the residuals without effects, as white noise of unknown
+    variance. The steps of a record with the rig in its manifest are known.
+    """
+    rig = next(iter(trims.values()))
+    assert rig.flight is not None
+    steps, each = math.ceil(1.0 / (STEP_s * rig.frame_rate) - TINY), records.values()
+    flown = [one.manifest.get("rig") and "imported_from" not in one.manifest for one in each]
+    if rig.flight.steps_per_frame >= steps or any(flown):
+        return dict(trims), ""
+    finer = {file: one.changed({"flight.steps_per_frame": steps}) for file, one in trims.items()}
+
+    def missed(rigs: Mapping[str, Rig]) -> float:
+        found = 0.0
+        for file, record in records.items():
+            for output in airframe_outputs(rigs[file], record):
+                left = output.floor * output.residual(rigs[file])
+                found += len(left) * math.log(max(float(np.mean(left**2)), sys.float_info.min))
+        return found
+
+    if missed(trims) <= missed(finer):
+        return dict(trims), ""
+    return finer, (
+        f"The model is flown with {steps} steps a frame, which fit better than the "
+        f"{rig.flight.steps_per_frame} of the rig file."
+    )
+
+
 def prepare(
     rig: Rig,
     records: Mapping[str, Record],
@@ -134,6 +178,9 @@ def prepare(
         check_units(rig, record, control, file)
     rig = as_counted(rig, each, control) if control in rig.controls else rig
     trims, trim = trimmed(rig, records)
+    stepped = ""
+    if not rig.controls and baseline is None:
+        trims, stepped = finely_stepped(trims, records)
     rig = next(iter(trims.values()))
     for file, record in records.items():
         check_record(trims[file], record, control, file, moved=part.own)
@@ -155,7 +202,7 @@ def prepare(
     repeated = [
         words for file, one in records.items() for words in not_measured(one, own, file, set_points)
     ]
-    left_out = [*(why for one in live for why in one.left_out), *repeated]
+    left_out = [stepped, *(why for one in live for why in one.left_out), *repeated]
     for file, record in records.items() if part.own else ():
         left_out += clipped(record, control, file)
     densities = dict[str, float]()

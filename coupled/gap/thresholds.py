@@ -94,6 +94,7 @@ KNOWN = 1e-4  # tolerance: the same of a flight by measured commands, and in rad
 # is removed, and above which it is kept: 0.01 in 11 blind records with creep, 0.35 in 3 without.
 CREEP_WORSE = (0.1, 0.3)
 CREEP_FRICTION_N = 2.0  # prior: of a friction that the rig file lacks; ablated
+STEP_s = 1.0 / 120.0  # step: of an aircraft alone; the default of JSBSim (FGFDMExec)
 SURFACE_GUST_m_per_s = 3.0  # step: to see whether an aircraft moves its own surfaces; ablated
 SAME_TRIM_rad = 1e-9  # step: largest difference of two trims of one model; ablated
 TRIM_SIGMAS = 4.0  # error rate: standard deviations of a trim's difference; ablated

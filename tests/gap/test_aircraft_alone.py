@@ -28,7 +28,7 @@ from coupled.gap.effects.library import BY_NAME
 from coupled.gap.findings.diagnosis import Diagnosis
 from coupled.gap.findings.flown import fly_force
 from coupled.gap.findings.where import lone_channel
-from coupled.gap.prepare import prepare
+from coupled.gap.prepare import finely_stepped, prepare
 from coupled.gap.search.beam import search_sets
 from coupled.gap.search.histories import search
 from coupled.gap.stages.airframe import airframe_outputs
@@ -356,6 +356,25 @@ def test_an_aircraft_whose_motion_is_within_its_noise_is_not_judged(healthy: Rec
     assert (found.verdict, found.stage("airframe").judged) == ("ambiguous", False)
     assert "Whether the airframe has a gap cannot be decided" in str(found.summary)
     assert "shows little but noise" in found.stage("airframe").why
+
+
+def test_a_rig_of_wide_steps_is_flown_with_those_that_fit_the_log(tmp_path: Path) -> None:
+    record = import_log(flown(tmp_path, {"/Clp": 0.9}, 8.0, rate_Hz=40.0)[0])[0]
+    trims, _ = trimmed(alone().changed({"frame_rate_Hz": 40.0}), {"log": record})
+    finer, said = finely_stepped(trims, {"log": record})
+    assert finer["log"]["flight.steps_per_frame"] == 3
+    assert "3 steps a frame, which fit better than the 1 of the rig file" in said
+    assert finely_stepped(finer, {"log": record}) == (finer, "")
+    # The log of a simulation with a step per row.
+    data = record.data.copy()
+    for output in airframe_outputs(trims["log"], record):
+        if output.channel in record:
+            own = output.measured - output.floor * output.residual(trims["log"])
+            data[:, record.channels.index(output.channel)] = own
+    coarse = Record(record.channels, data)
+    assert finely_stepped(trims, {"log": coarse}) == (trims, "")
+    named = Record(record.channels, record.data, {"rig": {"name": "own"}})
+    assert finely_stepped(trims, {"log": named}) == (trims, "")
 
 
 def test_a_surface_whose_position_stays_at_rest_in_the_model_is_refused(healthy: Record) -> None:
