@@ -55,7 +55,7 @@ from coupled.gap.search.case import Case, Tell, allowing_for_contact
 from coupled.gap.signals.live import judged_part, live_of
 from coupled.gap.signals.output import Floats, Output, estimate_noise, rounding
 from coupled.gap.signals.reading import drifts, in_trim, softest_gradient, worth_recording
-from coupled.gap.stages.airframe import Flights, airframe_outputs
+from coupled.gap.stages.airframe import Flights, airframe_outputs, unjudged_axes
 from coupled.gap.stages.labels import check_labels
 from coupled.gap.stages.openloop import not_judged
 from coupled.gap.stages.stages import Reader
@@ -205,6 +205,7 @@ def prepare(
     left_out = [stepped, *(why for one in live for why in one.left_out), *repeated]
     for file, record in records.items() if part.own else ():
         left_out += clipped(record, control, file)
+    left_out += [] if rig.controls else unjudged_axes(outputs, each)
     densities = dict[str, float]()
     if any(output.stage == AIRFRAME for output in outputs):
         left_out += [not_judged(each), *(not_in_trim(one, file) for file, one in records.items())]

@@ -31,7 +31,7 @@ from coupled.gap.findings.where import lone_channel
 from coupled.gap.prepare import finely_stepped, prepare
 from coupled.gap.search.beam import search_sets
 from coupled.gap.search.histories import search
-from coupled.gap.stages.airframe import airframe_outputs
+from coupled.gap.stages.airframe import airframe_outputs, unjudged_axes
 from coupled.gap.stages.openloop import is_throttled
 from coupled.record.channels import LATERAL, SURFACES
 from coupled.record.importing.convert import import_log
@@ -356,6 +356,28 @@ def test_an_aircraft_whose_motion_is_within_its_noise_is_not_judged(healthy: Rec
     assert (found.verdict, found.stage("airframe").judged) == ("ambiguous", False)
     assert "Whether the airframe has a gap cannot be decided" in str(found.summary)
     assert "shows little but noise" in found.stage("airframe").why
+
+
+def test_an_axis_that_a_log_does_not_show_is_named(healthy: Record) -> None:
+    trims, _ = trimmed(alone(), {"log": healthy})
+    rig, noisy_log = trims["log"], with_noise(healthy)
+    assert unjudged_axes(airframe_outputs(rig, noisy_log), [noisy_log]) == []
+    for lost, named in (
+        (SURFACES["wheel"] + "_rad", "aileron_rad"),
+        (("roll_rate_rad_per_s", "yaw_rate_rad_per_s", "sideslip_rad"), "roll_rate_rad_per_s, yaw"),
+    ):
+        less = without(noisy_log, *((lost,) if isinstance(lost, str) else lost))
+        (said,) = unjudged_axes(airframe_outputs(rig, less), [less])
+        assert said.startswith(f"Without {named}")
+        assert said.endswith("the lateral motion is not judged.")
+    data = healthy.data.copy()
+    for name in LATERAL:
+        if name in healthy:
+            column = data[:, healthy.channels.index(name)]
+            column[:] = column[0] + 1e-3 * (column - column[0])
+    still = with_noise(Record(healthy.channels, data))
+    said = "The lateral motion hardly exceeds its noise, which may hide its gap."
+    assert unjudged_axes(airframe_outputs(rig, still), [still]) == [said]
 
 
 def test_a_rig_of_wide_steps_is_flown_with_those_that_fit_the_log(tmp_path: Path) -> None:

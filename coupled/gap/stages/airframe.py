@@ -423,6 +423,23 @@ def _output(
     return replace(made, hidden_gap=HiddenGap(floor / float(np.std(measured)), noisiest, name))
 
 
+def unjudged_axes(outputs: Sequence[Output], records: Sequence[Record]) -> list[str]:
+    """Return sentences on the axes of an aircraft alone that its records do not show.
+
+    They lack the channels, or each of these has a noise floor that hides a gap.
+    """
+    surfaces, found = (surface_channel("wheel"), surface_channel("pedals")), []
+    for axis, needed in (("pitching", COMPARED[:3]), ("lateral", (*surfaces, *_LATERAL))):
+        floors = [one.hidden_gap for one in outputs if one.channel in needed]
+        lacking = [name for name in needed if all(name not in record for record in records)]
+        if not floors and lacking:
+            first = [name for name in lacking if name in surfaces] or lacking
+            found.append(f"Without {', '.join(first)} the {axis} motion is not judged.")
+        elif all(one is not None and one.much for one in floors):
+            found.append(f"The {axis} motion hardly exceeds its noise, which may hide its gap.")
+    return found
+
+
 def _known_motion(rig: Rig, record: Record) -> tuple[str, ...]:
     """Return the motion's channels that the surfaces of a record determine.
 
