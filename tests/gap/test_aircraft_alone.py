@@ -236,6 +236,18 @@ def test_a_channel_that_alone_has_a_gap_is_named(
     assert (words != "") is told
 
 
+def test_a_small_offset_of_a_lone_channel_is_named(healthy: Record) -> None:
+    """An accelerometer's zero of twice its noise floor was unexplained, without its name."""
+    data = healthy.data.copy()
+    data[:, healthy.channels.index("load_factor")] += 4e-3
+    data[:, 1:] += np.random.default_rng(1).normal(0.0, 1e-3, data[:, 1:].shape)
+    record = Record(healthy.channels, data)
+    rig = trimmed(at_rate_of(alone(), {"log": record}), {"log": record})[0]["log"]
+    outputs = airframe_outputs(rig, record)
+    assert max(one.gap(rig) for one in outputs) < 2.5
+    assert "Of the motion load_factor alone has a gap" in lone_channel(outputs, rig)
+
+
 def test_air_of_another_density_is_named(healthy: Record) -> None:
     """A hot day, or an altitude above the ground, was a mass and three inertias of 0.89 each."""
     rig = trimmed(at_rate_of(alone(), {"log": healthy}), {"log": healthy})[0]["log"]

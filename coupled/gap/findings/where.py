@@ -219,12 +219,17 @@ def lone_channel(outputs: Sequence[Output], rig: Rig) -> str:
     """Return a sentence on the only channel of the motion with a gap; empty if there are others.
 
     An error of the aircraft's forces shows in several, of which a small one may exceed the limit of
-    one alone. The trim alone may be off by one of them.
+    one alone, unless it is mostly a constant. The trim alone may be off by one of them.
     """
     judged = [one for one in outputs if one.stage == FLOWN and one.channel != TRIM]
     clear = {one.channel for one in judged if one.gap(rig) <= one.limit}
     with_gap = {one.channel for one in judged} - clear
-    distinct = any(one.gap(rig) > DOUBLED * one.limit for one in judged)
+    distinct = any(
+        one.gap(rig) > DOUBLED * one.limit
+        or np.mean(one.residual(rig)) ** 2 > MOST * np.mean(one.residual(rig) ** 2)
+        for one in judged
+        if one.channel in with_gap
+    )
     if len(with_gap) != 1 or len(clear) < 2 or not distinct:
         return ""
     (name,) = with_gap
