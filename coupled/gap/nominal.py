@@ -24,6 +24,7 @@ from coupled.gap.checks import at_rate_of, check_record, check_units, trimmed
 from coupled.gap.effects.effect import (
     BY_REGRESSOR,
     Effect,
+    declared_bounds,
     dotted,
     entry,
     fields_of,
@@ -144,13 +145,11 @@ def _usual_start(key: str, control: ControlName) -> float:
 def _bounds(holder: Section, field: str, start: float) -> tuple[float, float]:
     """Return the bounds of a field from its declaration."""
     far = FAR * abs(start)
-    low, high = -far, far
-    for bound in type(holder).model_fields[field].metadata:
-        low = max(low, float(getattr(bound, "ge", low)))
-        above = hasattr(bound, "gt") or field in NONE_AT_ZERO
-        low = max(low, 1e-3 * abs(start) if above else low)
-        high = min(high, float(getattr(bound, "le", getattr(bound, "lt", high))))
-    return low, min(high, LARGEST)
+    low, high = declared_bounds(holder, field)
+    above = any(hasattr(bound, "gt") for bound in type(holder).model_fields[field].metadata)
+    if above or field in NONE_AT_ZERO:
+        low = max(low, 1e-3 * abs(start))
+    return max(low, -far), min(high, far, LARGEST)
 
 
 @dataclass(frozen=True)
@@ -158,8 +157,8 @@ class Number:
     """A fitted parameter: value in the file, fitted value, and half of its 95 % interval.
 
     `half` is None if the parameter is undetermined, or absent: its filed value is 0, and its 95 %
-    interval includes 0. `most` is then the largest size in this interval. `least` is the lower
-    bound.
+    interval includes 0. `most` is then the largest size in this interval. `least` and
+    `greatest` are the bounds of a rig file, or the fit's lower one.
     """
 
     key: str
@@ -167,15 +166,17 @@ class Number:
     found: float
     half: float | None
     least: float = -math.inf
+    greatest: float = math.inf
     at_bound: bool = False
     most: float | None = None
 
     @property
     def interval(self) -> tuple[float, float] | None:
-        """The 95 % interval, cut at the lower bound; None if undetermined."""
+        """The 95 % interval, cut at the bounds; None if undetermined."""
         if self.half is None:
             return None
-        return max(self.found - self.half, self.least), self.found + self.half
+        low, high = self.found - self.half, self.found + self.half
+        return max(low, self.least), min(high, self.greatest)
 
     @property
     def width(self) -> float:
@@ -437,7 +438,8 @@ class _Fitter:
             found = parameter.low  # a fit at its bound stays slightly inside
         filed = float(parameter.nominal(self.rig, self.control))
         known = half if math.isfinite(half) else None
-        return Number(effect.name, filed, found, known, parameter.low, name in whole.at_bound)
+        bounds = parameter.low, parameter.accepted(self.rig, self.control)[1]
+        return Number(effect.name, filed, found, known, *bounds, name in whole.at_bound)
 
 
 def _doubts_of_servo(

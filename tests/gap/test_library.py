@@ -14,6 +14,9 @@ from coupled.gap.chain import STAGES, stage_of
 from coupled.gap.effects.effect import Effect, apply, possible, value_of
 from coupled.gap.effects.library import BY_NAME, EFFECTS
 from coupled.gap.effects.settings import settings
+from coupled.gap.findings.answer import estimate
+from coupled.gap.search.case import Case
+from coupled.gap.search.found import Fit
 from coupled.plots.signals import SIGNALS
 from coupled.record.channels import CONTROL_NAMES
 from coupled.rig.parameters import Control
@@ -72,6 +75,41 @@ def test_an_effect_is_entered_under_its_keys_and_nothing_else(effect: Effect, fl
         same = apply(rig, control, [effect], neutral)
         for p in effect.parameters:
             assert value_of(same, control, p.key) == value_of(rig, control, p.key)
+
+
+@pytest.mark.parametrize(
+    ("name", "number", "ends"),
+    [
+        ("presliding_friction", "elastic_share", (0.0, 0.99)),
+        ("load_friction", "factor", (0.0, 0.9)),
+        ("bend_hysteresis", "share", (0.0, 1.0)),
+        ("transport_delay", "delay_s", (0.0, 0.2)),
+        ("crosstalk", "factor", (-1.0, 1.0)),
+        ("force_skew", "delay_s", (-0.5, 0.5)),
+        ("pitch_damping", "factor", (-10.0, 10.0)),
+        ("inertia", "factor", (0.0, None)),
+        ("force_offset", "offset_N", (None, None)),
+    ],
+)
+def test_an_interval_has_only_values_that_a_rig_file_accepts(
+    name: str, number: str, ends: tuple[float | None, float | None], flown: Rig
+) -> None:
+    """The ends are those of docs/files.md, less the filed value of a parameter that is added."""
+    effect = BY_NAME[name]
+    [p] = [one for one in effect.free if one.name == number]
+    key, start, wide = effect.value_key(p), p.starts[0], 1e3
+    fit = Fit((effect,), {key: start}, {key: start - wide}, {key: start + wide}, (), flown, 0.0)
+    for filed in (0.0, 0.05) if p.mode == "added" else (p.nominal(flown, "column"),):
+        rig = apply(flown, "column", [effect], {key: filed}) if p.mode == "added" else flown
+        found = estimate(fit, effect, p, Case(rig, "column", []), 0.0)
+        for end, left, of_rig in zip(
+            ends, (-1, 1), (found.found_low, found.found_high), strict=True
+        ):
+            assert of_rig is not None
+            if end is None:
+                assert left * of_rig > 0.9 * wide
+            else:
+                assert of_rig == pytest.approx(end)
 
 
 def test_every_stage_and_name_is_listed_once(flown: Rig) -> None:

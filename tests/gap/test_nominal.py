@@ -11,7 +11,7 @@ import pytest
 
 from coupled.errors import InputError
 from coupled.gap.diagnose import diagnose
-from coupled.gap.nominal import NominalFit, fit_nominal
+from coupled.gap.nominal import NominalFit, Number, fit_nominal
 from coupled.record.record import Record, read_record, write_record
 from coupled.rig.rig import Rig
 from coupled.rig.rigedit import differences, edited
@@ -242,3 +242,10 @@ def test_a_measured_axis_has_the_published_numbers() -> None:
         if wanted is not None:
             assert number.interval is not None
             assert number.interval[0] < wanted < number.interval[1]
+
+
+def test_an_interval_of_a_fit_ends_where_a_rig_file_does() -> None:
+    """Of `friction_elastic_share`, 0 to 0.99, which a record of brief slips hardly determines."""
+    number = Number("loader.friction_elastic_share", 0.3, 0.4, 2.0, least=0.0, greatest=0.99)
+    assert number.interval == (0.0, 0.99)
+    assert number.as_dict()["high"] == 0.99

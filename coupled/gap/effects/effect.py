@@ -6,10 +6,10 @@ predicted with the changed rig.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from math import hypot
 from typing import Any, Literal, NamedTuple
 
 from coupled.errors import InputError
@@ -145,10 +145,24 @@ class Parameter:
         removes = self.mode == "added" and self.low == 0.0
         return -float(self.nominal(rig, control)) if removes else self.low, self.high
 
+    def accepted(self, rig: Rig, control: ControlName) -> tuple[float, float]:
+        """Return the least and the greatest value of the fit that a rig file accepts."""
+        if TERMS in self.key:
+            return -math.inf, math.inf
+        holder = section_of(rig, control, self.key.partition(".")[0])
+        low, high = declared_bounds(holder, field_of(rig, control, self.key))
+        filed = float(self.nominal(rig, control))
+        if self.mode == "factor" and filed > 0.0:
+            low, high = low / filed, high / filed
+        elif self.mode == "added":
+            low, high = low - filed, high - filed
+        least = self.bounds(rig, control)[0] if self.mode == "added" else 0.0
+        return max(low, least) if self.low >= 0.0 else low, high
+
     def error(self, value: float, rig: Rig, control: ControlName) -> float:
         """Return the smallest standard error of a value, from its model error."""
         size = self.size(value, rig, control)
-        return hypot(self.model_error.relative * size, self.model_error.absolute)
+        return math.hypot(self.model_error.relative * size, self.model_error.absolute)
 
     def size(self, value: float, rig: Rig, control: ControlName) -> float:
         """Return how far a value is from that without an effect; of a limit, the value itself."""
@@ -271,6 +285,15 @@ def value_of(rig: Rig, control: ControlName, key: str) -> Any:
 def section_of(rig: Rig, control: ControlName, section: str) -> Any:
     """Return a section of a control, or the flight."""
     return rig.flight if section == "flight" else getattr(rig.controls[control], section)
+
+
+def declared_bounds(holder: Section, field: str) -> tuple[float, float]:
+    """Return the bounds of a field in a rig file."""
+    low, high = -math.inf, math.inf
+    for bound in type(holder).model_fields[field].metadata:
+        low = max(low, float(getattr(bound, "ge", getattr(bound, "gt", low))))
+        high = min(high, float(getattr(bound, "le", getattr(bound, "lt", high))))
+    return low, high
 
 
 def fields_of(rig: Rig, control: ControlName, section: str) -> dict[str, str]:

@@ -154,7 +154,7 @@ def effects_of(
         if effect.sampled is not None:
             errors = [effect.sampled.error(reader.rig, reader.record) for reader in readers]
             scatter = float(np.sqrt(np.sum(np.square(errors)))) / len(errors)
-        numbers = tuple(_estimate(choice.fit, effect, p, case, scatter) for p in effect.free)
+        numbers = tuple(estimate(choice.fit, effect, p, case, scatter) for p in effect.free)
         together = sum(p.has_neutral for p in effect.free) > 1 and step.gain > VERY_STRONG
         sized = together or has_size(effect, case, numbers)
         most = STATED_MOST if sized else (CERTAIN - NEGLIGIBLE)
@@ -176,9 +176,13 @@ def has_size(effect: Effect, case: Case, numbers: Sequence[ParameterEstimate]) -
     return not sizes
 
 
-def _estimate(
+def estimate(
     fit: Fit, effect: Effect, p: Parameter, case: Case, scatter: float
 ) -> ParameterEstimate:
+    """Return a fitted parameter with its interval, cut at the values that a rig file accepts.
+
+    `scatter` is the relative sampling error of a random quantity, else 0.
+    """
     key = effect.value_key(p)
     value = fit.values[key]
     # The covariance includes noise and misfit, but not that the fit may stop off the optimum.
@@ -191,9 +195,9 @@ def _estimate(
     twin = other_side(value, case.nominal.frame_rate) if p.kind == "aliased" else None
     if twin is not None:  # aliased: the tone may lie on either side of the Nyquist frequency
         low, high = min(low, twin - (value - low)), max(high, twin + (high - value))
-    if p.low >= 0.0 and math.isfinite(low):  # the rig's own number cannot be negative
-        least = p.bounds(case.nominal, case.control)[0] if p.mode == "added" else 0.0
-        low = max(low, min(least, value))
+    least, most = p.accepted(case.nominal, case.control)
+    low = max(low, min(least, value)) if math.isfinite(low) else low
+    high = min(high, max(most, value)) if math.isfinite(high) else high
     ends = (low if math.isfinite(low) else None, high if math.isfinite(high) else None)
     filed = float(p.nominal(case.nominal, case.control))
     found_low, found_high = (None if one is None else float(p.entered(filed, one)) for one in ends)
