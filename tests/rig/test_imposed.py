@@ -32,6 +32,22 @@ def test_mass_spring_and_damper_answer_as_their_equation_says() -> None:
     assert found[MIDDLE] == pytest.approx(wanted[MIDDLE], abs=2e-3 * np.ptp(wanted))
 
 
+@pytest.mark.parametrize("rate_Hz", [25.0, 250.0, 2000.0])
+def test_a_spring_or_a_mass_alone_answers_without_damping(rate_Hz: float) -> None:
+    """Of 2 Hz at 25 rows a second, and of a spring whose force is far above that of a damper."""
+    time, turn = np.arange(round(6.0 * rate_Hz)) / rate_Hz, 4.0 * np.pi
+    way = SIZE * np.sin(turn * time)
+    for numbers in ({"mass_kg": 1e-6, "basic_gradient_N_per_m": 6e3}, {"mass_kg": 8.0}):
+        usual = {"basic_gradient_N_per_m": 0.0, "damping_N_s_per_m": 1e-3}
+        rig = bench({**usual, **numbers}, {**BENCH, "frame_rate_Hz": rate_Hz})
+        loader = rig.controls["column"].loader
+        rigid = rig.changed({"controls.column.compensation.gradient": False})
+        total = np.full(len(way), loader.basic_gradient)
+        found = answer_to(rigid, "column", on_nodes(rigid, way), Feel(total)).force[8:-8]
+        wanted = ((loader.basic_gradient - loader.mass * turn**2) * way)[8:-8]
+        assert found == pytest.approx(wanted, abs=1e-3 * np.ptp(wanted))
+
+
 @pytest.mark.parametrize("curve", [False, True])
 def test_beyond_the_break_the_second_gradient_answers(curve: bool) -> None:
     first, second, at = G, 300.0, 0.02
