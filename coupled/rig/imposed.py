@@ -74,6 +74,7 @@ Numbers = NDArray[np.intp]
 SOLVES, SOLVED = 80, 1e-10  # most steps for a substep's speed, and their relative tolerance
 DAMPED = 0.125  # of a substep: a stiff contact's error falls to 60 % in each
 RIGID = 1e-4  # of the travel, presliding of a rigid contact here
+NEIGHBOURS = 2  # frames to either side from which the acceleration at a frame is computed
 REST_s = 0.25  # a loader that moves by less than that presliding within this time is at rest
 
 

@@ -5,6 +5,7 @@ What each answer must be was written down before it was run.
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from coupled.gap.diagnose import diagnose
@@ -14,7 +15,12 @@ from coupled.gap.nominal import default_keys, fit_nominal
 from coupled.gap.prepare import as_driven, readers_of
 from coupled.gap.search.found import Candidate, Choice, Fit, Found
 from coupled.gap.stages.tried import as_judged
+from coupled.record.record import Record
+from coupled.rig.rig import Rig
 from tests.support.machines import damper, damper_rig
+from tests.support.rigs import BENCH, bench
+
+HEAVY_kg = 8.0
 
 
 def test_a_damper_beside_its_own_numbers_has_no_gap() -> None:
@@ -22,6 +28,51 @@ def test_a_damper_beside_its_own_numbers_has_no_gap() -> None:
     assert found.verdict == "no_gap"
     assert found.stage("loader").gap == pytest.approx(1.0, abs=0.15)
     assert found.closed_loop is None  # nobody flies it by its force
+
+
+def heavy(rate_Hz: float, mass_kg: float = HEAVY_kg) -> tuple[Rig, Record]:
+    """Return a bench of `HEAVY_kg` and its record, of a machine of another mass.
+
+    Sines up to 2 Hz in few rows a second, to the last row: F = m·a + c·v + k·x, and white noise.
+    """
+    damping, stiffness = 80.0, 600.0
+    time = np.arange(round(40.0 * rate_Hz)) / rate_Hz
+    turns = 2.0 * np.pi * np.array([0.13, 0.41, 0.83, 1.31, 1.97])
+    angle = np.outer(time, turns) + np.array([0.3, 2.1, 4.0, 5.2, 1.1])
+    place, speed = 0.02 * np.sin(angle).sum(axis=1), 0.02 * np.cos(angle) @ turns
+    rng = np.random.default_rng(4)
+    force = mass_kg * -0.02 * np.sin(angle) @ turns**2 + damping * speed + stiffness * place
+    force += rng.normal(0.0, 0.02, len(time))
+    place += rng.normal(0.0, 2e-6, len(time))
+    numbers = {"mass_kg": HEAVY_kg, "damping_N_s_per_m": damping, "bend_m_per_N": 0.0}
+    numbers |= {"basic_gradient_N_per_m": stiffness}
+    of_column = {"drive": "displacement", "compensation.gradient": False}
+    of_column |= {"schedule.dynamic_pressure_Pa": [0.0]}
+    of_column |= {"schedule.total_gradient_N_per_m": [stiffness]}
+    dotted = {f"controls.column.{key}": value for key, value in of_column.items()}
+    rig = bench({**numbers, **dotted}, {**BENCH, "frame_rate_Hz": rate_Hz})
+    names = ("time_s", "column_force_N", "column_computed_m")
+    return rig, Record(names, np.column_stack((time, force, place)))
+
+
+@pytest.mark.parametrize("rate_Hz", [25.0, 40.0])
+def test_a_heavy_bench_whose_record_ends_in_motion_has_no_gap(rate_Hz: float) -> None:
+    rig, record = heavy(rate_Hz)
+    assert diagnose(rig, {"r": record}).verdict == "no_gap"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("rate_Hz", [25.0, 40.0])
+def test_the_mass_of_a_heavy_bench_is_known_closely(rate_Hz: float) -> None:
+    rig, record = heavy(rate_Hz, 1.1 * HEAVY_kg)
+    found = diagnose(rig, {"r": record})
+    assert found.verdict == "effect"
+    [effect] = found.effects
+    [number] = effect.parameters
+    assert effect.name == "inertia"
+    assert number.low is not None
+    assert number.high is not None
+    assert 1.09 < number.low < 1.1 < number.high < 1.11
 
 
 def test_a_grip_with_its_force_and_nothing_else_is_taken_as_moved() -> None:

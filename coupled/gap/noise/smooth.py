@@ -41,6 +41,7 @@ from coupled.gap.thresholds import (
     CORNER_FRAMES,
     FAR_SIGMAS,
     FEW_FRAMES,
+    NEGLIGIBLE,
     PARTLY,
     PIECE,
     ROUNDING_SPAN,
@@ -256,6 +257,13 @@ class Smoother:
         drift = np.linspace(long[0], long[-1], len(long))
         out = drift + np.fft.irfft(np.fft.rfft(long - drift) * self.gain, len(long))
         return np.asarray(out[self.reach : self.reach + len(noise)])
+
+    @property
+    def memory(self) -> int:
+        """The number of frames beyond which its impulse response is below `NEGLIGIBLE` in sum."""
+        size = np.abs(np.fft.irfft(self.gain))[: len(self.gain)]
+        beyond = np.cumsum(size[::-1])[::-1]
+        return int(np.argmax(beyond <= NEGLIGIBLE * beyond[0]))
 
     def wiener_error(self, level: Noise, frames: int, rng: np.random.Generator) -> Floats:
         """Return a sample of the smoothing error, PSD H·Sₙ: noise passed and signal lost.

@@ -44,15 +44,15 @@ from numpy.typing import NDArray
 
 from coupled.gap.effects.settings import CONTACT, is_dry, most_yielding
 from coupled.gap.noise.noise import Noise
-from coupled.gap.noise.smooth import rate_of, smoothed
+from coupled.gap.noise.smooth import Smoother, rate_of, smoothed
 from coupled.gap.signals.floors import Drive, with_error
 from coupled.gap.signals.output import Floats, Predict
 from coupled.gap.signals.reading import Reading
-from coupled.gap.thresholds import CREEP_FRICTION_N, CREEP_WORSE, LESSER, SIGMAS, TRIES
+from coupled.gap.thresholds import CREEP_FRICTION_N, CREEP_WORSE, LESSER, SIGMAS, SMALL, TRIES
 from coupled.parallel import in_threads
 from coupled.record.channels import ControlName, unit_of
 from coupled.rig.hosted import Hosted
-from coupled.rig.imposed import answer_to, behind_linkage
+from coupled.rig.imposed import NEIGHBOURS, answer_to, behind_linkage
 from coupled.rig.nodes import Nodes
 from coupled.rig.recorder import stamped
 from coupled.rig.replay import Restart, drive_series
@@ -120,11 +120,17 @@ def _without_creep(rig: Rig, at: Driven, measured: Floats, times: float = 1.0) -
 def under_motion(reading: Reading) -> tuple[Predict, Noisy]:
     """Return the prediction of the force as read, N, under an imposed motion.
 
-    And that with a numbered sample of the error of the smoothed motion.
+    And that with a numbered sample of the error of the smoothed motion. A smoother bends a motion
+    that does not rest at an end of the record: within its memory of both, where the inertia would
+    be wrong, the prediction is the measurement.
     """
     control, inputs, others = reading.control, reading.other_inputs(), reading.others()
     feel, force, measured = reading.feel(), reading.pulled(), reading.signal("force")
-    motion, level = smoothed(reading.signal(reading.imposed)), reading.driving(reading.imposed)
+    given, level = reading.signal(reading.imposed), reading.driving(reading.imposed)
+    smoother = Smoother.of(given)
+    motion, frames = smoother.smooth(given), np.arange(len(given))
+    spoiled = min(smoother.memory + NEIGHBOURS, int(SMALL * len(given)))
+    ends = np.minimum(frames, frames[::-1]) < spoiled
 
     def moved_by(motion: Floats, pulled: Floats) -> Predict:
         """Return the prediction for a motion as read, d, and F, N, which bends the structure."""
@@ -150,7 +156,7 @@ def under_motion(reading: Reading) -> tuple[Predict, Noisy]:
                 gauged = data.sensing.force_scale * shown + data.sensing.force_zero
                 return stamped(gauged, late_s * rig.frame_rate)
 
-            made = read(answer.force)
+            made = np.where(ends, measured, read(answer.force))
             if (answer.most > answer.least).any():
                 made = _within_rests(made, force.smooth, read(answer.least), read(answer.most))
             return _within_jumps(made, measured, answer.jumps) if answer.jumps.any() else made
