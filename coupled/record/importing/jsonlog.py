@@ -125,6 +125,8 @@ def _column(name: str, cells: Sequence[Any]) -> pl.Series:
     given = [cell for cell in cells if cell is not None]
     switches = {isinstance(cell, bool) for cell in given}  # among numbers they are no numbers
     if len(switches) < 2 and all(isinstance(cell, (int, float)) for cell in given):
+        if switches == {True}:
+            return pl.Series(name, cells, dtype=pl.Boolean)
         whole = all(isinstance(cell, int) and abs(cell) < 2**63 for cell in given)
         if whole and given:
             return pl.Series(name, cells, dtype=pl.Int64, strict=False)

@@ -77,6 +77,8 @@ def _by_itself(name: str, values: Floats) -> list[str]:
     if repeats := plausible.held(values):
         doubts.append(repeats)
     step = None if name.endswith("_stop") else plausible.quantised_step(values)
+    if not name.endswith("_stop") and np.unique(values).size == 2:
+        doubts.append("only two values: a switch?")
     if step is not None:
         doubts.append(f"quantised, step {step:.3g}")
     row = plausible.starts_again(values) if _is_position(name) else None

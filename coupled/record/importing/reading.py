@@ -99,6 +99,11 @@ class Log:
         """Return a channel's column as doubles, signed, NaN if a cell is empty: (rows,)."""
         name = channel.source
         column = self._pointed(name, self.find(name, map_file, f"{key}.from"))
+        if column.dtype == pl.Boolean and not channel.own:
+            problem = (
+                "holds true and false, no quantity; own = true reads it for a channel of yours"
+            )
+            raise InputError(self.file, name, problem)
         if channel.element is not None:
             names = labels_of(name, column, self.columns)
             where = Place(self.file, name, self.line)

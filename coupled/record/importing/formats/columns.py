@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from coupled.errors import InputError, shown
 
-Numbers = NDArray[np.float64] | NDArray[np.int64]
+Numbers = NDArray[np.float64] | NDArray[np.int64] | NDArray[np.bool_]
 MOST_COLUMNS = 20_000
 TIMES = ("time", "t", "timestamp")  # names of a struct's stamps
 TEXT = "holds text or objects, no numbers"
@@ -61,10 +61,12 @@ def scaling_in(attributes: Mapping[str, Any], applied: Sequence[str] = ()) -> st
 
 
 def as_numbers(values: object) -> Numbers | None:
-    """Return a column's values as integers or doubles, or None if they are neither."""
+    """Return a column's values as integers, doubles or booleans, or None if they are others."""
     array = np.asarray(values)
     if array.ndim != 1 or array.dtype.kind not in "biuf":
         return None
+    if array.dtype.kind == "b":
+        return array
     if array.dtype.kind == "f":
         return array.astype(np.float64)
     if array.dtype.kind == "u" and array.size and int(array.max()) > np.iinfo(np.int64).max:
@@ -130,7 +132,8 @@ def by_their_times(columns: Sequence[Found]) -> list[Found]:
     times: dict[str, Found] = {}
     for column in columns:
         struct, _, field = column.name.rpartition(".")
-        if field.casefold() in TIMES and column.values.size and np.all(np.diff(column.values) >= 0):
+        times_like = field.casefold() in TIMES and column.values.size
+        if times_like and np.all(np.diff(column.values.astype(np.float64)) >= 0):
             times.setdefault(struct, column)
     owners = [_struct_with_time(column, times) for column in columns]
     used = [times[struct].values for struct in times if struct in owners]
@@ -175,11 +178,15 @@ def pack(columns: Sequence[Found]) -> pl.DataFrame:
     words = {key: [getattr(c, key) for c in columns] for key in WORDS}
     whole = [c.values.dtype.kind != "f" for c in columns]
     floats = [pl.Series([] if w else c.values) for c, w in zip(columns, whole, strict=True)]
-    counts = [pl.Series(c.values if w else []) for c, w in zip(columns, whole, strict=True)]
+    counts = [
+        pl.Series(c.values.astype(np.int64) if w else [])
+        for c, w in zip(columns, whole, strict=True)
+    ]
     return pl.DataFrame(
         {
             **words,
             "is_whole": whole,
+            "is_switch": [c.values.dtype.kind == "b" for c in columns],
             "doubles": pl.Series(floats, dtype=pl.List(pl.Float64)),
             "whole": pl.Series(counts, dtype=pl.List(pl.Int64)),
         }
@@ -189,7 +196,8 @@ def pack(columns: Sequence[Found]) -> pl.DataFrame:
 def unpack(table: pl.DataFrame) -> list[Found]:
     """Return the columns of `pack`."""
     words = table.select(WORDS).rows(named=True)
-    return [
-        Found(values=table["whole" if is_whole else "doubles"][row].to_numpy(), **words[row])
-        for row, is_whole in enumerate(table["is_whole"])
-    ]
+    columns = []
+    for row, (is_whole, is_switch) in enumerate(table.select("is_whole", "is_switch").rows()):
+        values = table["whole" if is_whole else "doubles"][row].to_numpy()
+        columns.append(Found(values=values.astype(bool) if is_switch else values, **words[row]))
+    return columns

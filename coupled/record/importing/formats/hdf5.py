@@ -16,7 +16,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from coupled.errors import InputError
+from coupled.errors import InputError, shown
 from coupled.record.importing.formats.columns import (
     MOST_COLUMNS,
     Found,
@@ -131,6 +131,8 @@ def _take(found: dict[str, Found], file: Any, item: Any, name: str, depth: int) 
     ]
     scaling = scaling_in(item.attrs, applied)
     values = _unpacked(values, item.attrs)
+    if _word(item.attrs.get("MATLAB_class", "")) == "logical":
+        values = values.astype(bool)
     if values.dtype.names:
         for field in values.dtype.names:
             _keep(found, f"{name}.{field}", values[field])
@@ -143,6 +145,10 @@ def _keep(
 ) -> None:
     if values.ndim == 2 and 1 in values.shape:
         values = values.reshape(-1)
+    if (states := h5py.check_enum_dtype(values.dtype)) is not None:
+        problem = f"holds states by name, {shown(', '.join(states), 60)}, no numbers"
+        found[name] = Found(name, np.zeros(0), refused=problem)
+        return
     column: Numbers | None = as_numbers(values)
     if column is None:
         refused = unread(name, values)

@@ -67,7 +67,7 @@ def _load(path: Path, content: bytes) -> dict[str, Any]:
         return _load_together(path, content)
     found: dict[str, Any] = {}
     for name, variable in varmats_from_mat(io.BytesIO(content)):
-        loaded = scipy_io.loadmat(variable, verify_compressed_data_integrity=True)
+        loaded = scipy_io.loadmat(variable, mat_dtype=True, verify_compressed_data_integrity=True)
         value = loaded.get(name or "None")
         own = _field(value, "s0") or name if isinstance(value, MatlabOpaque) else name
         if not own or own.startswith("__"):
@@ -92,7 +92,10 @@ def _load_together(path: Path, content: bytes) -> dict[str, Any]:
         raise InputError(path, doubled[0], "duplicate variable")
     wanted = [name for name in listed if not name.startswith("__")]
     loaded = scipy_io.loadmat(
-        io.BytesIO(content), variable_names=wanted, verify_compressed_data_integrity=True
+        io.BytesIO(content),
+        mat_dtype=True,  # else scipy reads logicals as counts
+        variable_names=wanted,
+        verify_compressed_data_integrity=True,
     )
     return {name: value for name, value in loaded.items() if not name.startswith("__")}
 
@@ -122,7 +125,8 @@ def _collect(found: dict[str, Found], name: str, value: Any, depth: int) -> None
             for field in value.dtype.names:
                 _collect(found, f"{own}.{field}", element[field], depth + 1)
     elif value.dtype.kind in "biuf" and value.ndim == 2 and 1 in value.shape and value.size > 1:
-        found[name] = Found(name, value.reshape(-1).astype(np.float64))
+        values = value.reshape(-1)
+        found[name] = Found(name, values if values.dtype.kind == "b" else values.astype(np.float64))
     elif (refused := unread(name, value)) is not None:
         found[name] = refused
 

@@ -31,8 +31,9 @@ def read_ulog(path: Path, content: bytes) -> list[Found]:
         warnings.warn(f"the file is damaged {where}, and rows are lost", stacklevel=1)
     for data in log.data_list:
         topic = f"{data.name}[{data.multi_id}]" if data.multi_id else str(data.name)
+        switches = {each.field_name for each in data.field_data if each.type_str == "bool"}
         for field, values in data.data.items():
-            numbers = as_numbers(values)
+            numbers = as_numbers(values.astype(bool) if field in switches else values)
             if numbers is not None and len(columns) < MOST_COLUMNS:
                 unit = "us" if field == STAMPS else ""
                 stamps = f"{topic}.{STAMPS}"
