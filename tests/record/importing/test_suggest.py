@@ -60,6 +60,12 @@ def proposed(path: Path, rig: str = "") -> tuple[Proposal, dict[str, Any]]:
         ("Force_uN", "column_force_N", ""),
         ("qbar_kPa", "dynamic_pressure_Pa", "kPa"),
         ("grip_um", "column_deflection_m", "um"),
+        ("Kraft", "column_force_N", ""),
+        ("Knüppelkraft [daN]", "column_force_N", "daN"),
+        ("Griffweg (mm)", "column_deflection_m", "mm"),
+        ("Weg Soll [mm]", "column_computed_m", "mm"),
+        ("Handradwinkel [deg]", "wheel_deflection_rad", "deg"),
+        ("Drehmoment_Nm", "", ""),
     ],
 )
 def test_a_channel_and_its_unit_are_recognised_by_name(name: str, channel: str, unit: str) -> None:
@@ -302,3 +308,22 @@ def test_two_columns_of_one_name_are_both_listed(tmp_path: Path) -> None:
     proposal, _ = proposed(tmp_path / "log.csv")
     assert proposal.mapped == {"column_force_N": "grip force [lbf]#1"}
     assert proposal.unmapped == ("grip force [lbf]#2",)
+
+
+@pytest.mark.parametrize("other", ["Stick Force Cmd", "Kraft Sollwert", "force sensor ok", "Force"])
+def test_a_measured_force_comes_before_a_commanded_one_and_a_switch(
+    tmp_path: Path, other: str
+) -> None:
+    wrong = {
+        "force sensor ok": np.where(np.sin(TIME_s) > 0.0, 1.0, 0.0),
+        "Force": np.ones(TIME_s.size),
+    }
+    table = {
+        "t [s]": TIME_s,
+        f"{other} [N]": wrong.get(other, 1.1 * FORCE_N),
+        "Kraft Istwert [N]": FORCE_N,
+        "Grip [m]": DEFLECTION_m,
+    }
+    pl.DataFrame(table).write_csv(tmp_path / "log.csv")
+    proposal, _ = proposed(tmp_path / "log.csv")
+    assert proposal.mapped["column_force_N"] == "Kraft Istwert [N]"

@@ -7,6 +7,7 @@ unit.
 from __future__ import annotations
 
 import re
+import unicodedata
 from dataclasses import dataclass
 
 from coupled.record.channels import ControlName, channel
@@ -19,20 +20,24 @@ def _set(text: str) -> frozenset[str]:
 
 
 CONTROLS: dict[ControlName, frozenset[str]] = {
-    "column": _set("column col stick yoke elev elevator pitch lon longitudinal"),
-    "wheel": _set("wheel whl aileron ail roll lat lateral"),
-    "pedals": _set("pedals pedal ped rudder rud yaw dir directional"),
+    "column": _set(
+        "column col stick yoke elev elevator pitch lon longitudinal knueppel steuersaeule"
+    ),
+    "wheel": _set("wheel whl aileron ail roll lat lateral handrad"),
+    "pedals": _set("pedals pedal ped rudder rud yaw dir directional pedale"),
 }
+# Words of a setpoint: a force with one is not the measured force if another one is there.
+COMMANDS = _set("cmd command commanded target setpoint ref soll")
 QUANTITIES = {
     "modifying_force": _set("fmod modifying"),
-    "force": _set("force frc f load loadcell lc pull gauge newton lbf"),
-    "computed": _set("computed servo actuator cmd command commanded control target setpoint ref"),
-    "deflection": _set("deflection defl grip hand true actual measured state sensor"),
+    "force": _set("force frc f load loadcell lc pull gauge newton lbf kraft"),
+    "computed": _set("computed servo actuator control stell aktor antrieb") | COMMANDS,
+    "deflection": _set("deflection defl grip hand true actual measured state sensor griff ist"),
 }
 # Words for transducers of position, which identify the end only if no other word does.
 DEVICES = {"computed": _set("encoder enc pot lvdt"), "deflection": _set("laser")}
 ENDS = ("computed", "deflection")
-PLACES = _set("position pos angle disp displacement travel")  # of either end
+PLACES = _set("position pos angle disp displacement travel weg winkel lage")  # of either end
 # A motion's channel by any of these sets of words, the longest match first.
 MOTION = {
     "dynamic_pressure_Pa": "qbar|q bar|qc|dynamic pressure|dyn press|impact pressure",
@@ -56,6 +61,9 @@ SHORT = {"elev": "elevator_rad", "ail": "aileron_rad", "rud": "rudder_rad"}
 TIME = _set("time timestamp stamp clock utc date datetime elapsed sec seconds")
 TIME |= _set("zeit uhrzeit zeitstempel datum")
 TORQUE = _set("torque moment nm")
+# German words of one, of which the last part is a quantity: `Handkraft`, `Istwert`.
+COMPOUND = re.compile(r"(?<=[a-z]{3})(kraft|weg|winkel|moment|wert)(?![a-z])")
+UMLAUTS = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss"})
 # Words of names that have a load or a state but are no part of a control.
 COMPUTER = _set(
     "cpu cpuload gpu ram memory mem bus network net disk battery thread task process queue"
@@ -84,19 +92,22 @@ class Reading:
     """The content of a name. `channel` is "time", a record's channel, or "" if it has none.
 
     `sure` is false if the control or the meaning is ambiguous, as that of a time which has only
-    the unit of one; `either_end`: it is a position of the grip or the computed one.
+    the unit of one; `either_end`: it is a position of the grip or the computed one. `commanded`: a
+    force with a word of a setpoint.
     """
 
     channel: str
     unit: str = ""
     sure: bool = True
     either_end: bool = False
+    commanded: bool = False
 
 
 def words_of(name: str) -> list[str]:
     """Return the words of a name in lower case: `ColPos_in` is col, pos, in."""
     spaced = re.sub(r"([a-z0-9])([A-Z])", r"\1 \2", name)
-    return re.findall(r"[a-z]+|\d+", spaced.lower())
+    plain = unicodedata.normalize("NFC", spaced).lower().translate(UMLAUTS)
+    return re.findall(r"[a-z]+|\d+", COMPOUND.sub(r" \1", plain))
 
 
 def read_name(name: str, listed_unit: str = "", log: str = "") -> Reading:
@@ -165,8 +176,9 @@ def _moved(words: list[str], unit: str, log_words: list[str]) -> Reading | None:
     if present & {"theta", "phi", "psi", "attitude", "bank", "heading"}:
         return None
     control: ControlName = controls[0] if controls else "column"
-    sure = len(controls) == 1 and not either
-    return Reading(channel(control, quantities[0]), unit, sure, either_end=either)
+    commanded = "force" in quantities[0] and bool(present & COMMANDS)
+    sure = len(controls) == 1 and not either and not commanded
+    return Reading(channel(control, quantities[0]), unit, sure, either, commanded)
 
 
 def is_torque(words: list[str]) -> bool:

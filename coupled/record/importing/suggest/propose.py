@@ -36,6 +36,7 @@ from coupled.units import Unit, parse_unit, units_like
 Floats = NDArray[np.float64]
 Line = tuple[str, object, str]  # a key, its value, and a remark
 LISTED = 8  # columns that a question lists
+FEWEST = 3  # values of a quantity; a switch has two, a constant one
 
 
 @dataclass(frozen=True)
@@ -223,10 +224,11 @@ def _rate(values: Floats, unit: str) -> list[Line]:
 def _chosen(columns: Sequence[Column]) -> dict[str, Column]:
     """Return the column of each channel; of several, the first with a certain name, or the first.
 
-    A position of either end is the computed one if the grip has its own.
+    A switch, a constant and a commanded force come last. A position of either end is the computed
+    one if the grip has its own.
     """
     chosen: dict[str, Column] = {}
-    for column in sorted(columns, key=lambda c: (c.reading.either_end, not c.reading.sure)):
+    for column in sorted(columns, key=_rank):
         channel, unit = column.reading.channel, column.reading.unit
         if not channel or column.kind in ("text", "dates") or not _fits(unit, channel):
             continue
@@ -234,6 +236,11 @@ def _chosen(columns: Sequence[Column]) -> dict[str, Column]:
             channel = channel.replace("_deflection_", "_computed_")
         chosen.setdefault(channel, column)
     return chosen
+
+
+def _rank(column: Column) -> tuple[bool, bool, bool, bool]:
+    read, there = column.reading, column.values[np.isfinite(column.values)]
+    return read.either_end, np.unique(there).size < FEWEST, read.commanded, not read.sure
 
 
 def _fits(unit: str, channel: str) -> bool:
