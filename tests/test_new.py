@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import shlex
 import shutil
 from pathlib import Path
 
@@ -184,3 +185,31 @@ def test_nothing_is_overwritten_and_endings_are_held(tmp_path: Path) -> None:
         assert said in done.stderr
     assert files(tmp_path) == {"mine.toml"}
     assert (tmp_path / "mine.toml").read_text() == "precious"
+
+
+@pytest.mark.parametrize(
+    ("stem", "name"),
+    [
+        ('Rück 7 "b"', "Ruck-7-b"),
+        (r"a\b", "a-b"),
+        ("two\nlines", "two-lines"),
+        ("it's <b>", "it-s-b"),
+        ("😀", "unnamed"),
+        ("n" * 90, "n" * 80),
+    ],
+)
+def test_a_file_of_any_name_is_valid(tmp_path: Path, stem: str, name: str) -> None:
+    bench = ("--set", "travel=0.1", "--set", "gradient=500", "--set", "servo=no")
+    rig, run = f"{stem}.toml", f"r {stem}.toml"
+    for words in (("rig", "--bench", rig, *bench), ("run", run, "--rig", rig)):
+        done = coupled(tmp_path, "new", *words)
+        assert done.returncode == 0, done.stderr
+    assert load_rig(tmp_path / rig).name == name
+    (case,) = read_run(str(tmp_path / run))
+    assert case.rig.name == name
+
+
+def test_the_next_command_can_be_copied(tmp_path: Path) -> None:
+    done = coupled(tmp_path, "new", "map", "it's a (map).toml")
+    said = done.stdout.replace("\n", " ").partition("next: ")[2]
+    assert shlex.split(said)[-1] == "it's a (map).toml"

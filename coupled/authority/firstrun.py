@@ -17,12 +17,13 @@ import numpy as np
 from coupled.authority.compare import fly_and_judge
 from coupled.authority.held import breakaway_force
 from coupled.authority.outcome import Flight
-from coupled.errors import InputError, collected
+from coupled.errors import InputError, collected, shown
 from coupled.flight.manoeuvre import Manoeuvre, PressureProfile
 from coupled.flight.pilot import Step
 from coupled.record.channels import RATE, ControlName
 from coupled.rig.equations import specified_force
 from coupled.rig.rig import Rig
+from coupled.rig.rigwrite import toml_string
 from coupled.surveying.survey import known_models, speed_range
 from coupled.units import DEGREE_rad, KNOT_m_per_s
 
@@ -125,15 +126,16 @@ def _head(
 ) -> list[str]:
     first = cases[0]
     where = f"of {rig.flight.model}" if rig.flight is not None else "on the bench"
+    card = f"A pull on the {control} {where}, the rig {rig.name}, held for {_HELD_s:g} s."
     lines = [
-        f"# A run for {rig.name}: written by `coupled new run`, each case flown once.",
+        f"# A run for {shown(rig.name)}: written by `coupled new run`, each case flown once.",
         "#   coupled compare FILE     flies it rigid, bent, and with each correction",
         "#   coupled check FILE       holds it against the [[expect]] below",
         "# All numbers are SI, and each key ends in its unit. docs/files.md lists every key.",
         "",
-        f'name = "{name}"',
-        f'card = "A pull on the {control} {where}, the rig {rig.name}, held for {_HELD_s:g} s."',
-        f'rig = "{word}"',
+        f"name = {toml_string(name)}",
+        f"card = {toml_string(card)}",
+        f"rig = {toml_string(word)}",
         f"duration_s = {_DURATION_s}",
     ]
     if rig.flight is None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from coupled.cli.app import JsonOption, UnitsOption, app
-from coupled.cli.new import check_new, new, write_new
+from coupled.cli.new import check_new, new, word_of, write_new
 from coupled.cli.progress import progress
 from coupled.cli.rigs import ControlOption
 from coupled.cli.terminal import check_json, give_json, out, say
@@ -178,6 +178,7 @@ def _bench(
     """Write a rig without an aircraft; on a terminal, prompt for numbers not given."""
     from coupled.gap.checks import check_record
     from coupled.record.samples import frame_rate_of
+    from coupled.rig.parameters import plain_name
     from coupled.rig.rigfile import rig_from_table
     from coupled.schema import loads_toml
     from coupled.surveying.benchrig import answer, bench_rig, questions, split_answers, yes
@@ -202,11 +203,11 @@ def _bench(
             servo = typer.confirm("a servo or motor moves the control?", default=False)
         numbers = _prompt_for_numbers(control, numbers, servo, units)
     source = shown(log.name) if log else ""
-    text = bench_rig(path.stem, control, numbers, servo, found, source, rate_Hz)
+    text = bench_rig(plain_name(path.stem), control, numbers, servo, found, source, rate_Hz)
     rig = rig_from_table(loads_toml(text, path), path)  # a rig that cannot be flown is refused
     if record is not None:
         check_record(rig, record, control, log)
-    write_new(path, text, ".toml", f"coupled new run --rig {path}")
+    write_new(path, text, ".toml", f"coupled new run --rig {word_of(path)}")
     if found is not None:
         _print_found(found, control, units)
 
@@ -264,6 +265,7 @@ def _print_found(found: LogNumbers, control: ControlName, units: System) -> None
 
 def _for_model(model: str, file: Path | None, airframe_only: bool) -> None:
     """Write a first rig for a JSBSim model: where it trims, found; its loader, guessed."""
+    from coupled.rig.parameters import plain_name
     from coupled.surveying.draft import draft
     from coupled.surveying.survey import chosen_model, surveyed
 
@@ -274,7 +276,7 @@ def _for_model(model: str, file: Path | None, airframe_only: bool) -> None:
         advance(f"where {chosen.label} trims", 0, 1)
         found = surveyed(model, chosen, airframe_only)
     folder = path_from(path.parent, chosen.home) if chosen.own else ""
-    text = draft(found, path.stem, folder, airframe_only)
-    then = f"coupled new run --rig {path}, and coupled compare"
-    then = f"coupled diagnose RECORD --rig {path}" if airframe_only else then
+    text = draft(found, plain_name(path.stem), folder, airframe_only)
+    then = f"coupled new run --rig {word_of(path)}, and coupled compare"
+    then = f"coupled diagnose RECORD --rig {word_of(path)}" if airframe_only else then
     write_new(path, text, ".toml", then)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import Annotated
 
@@ -40,11 +41,11 @@ def run(
     """Write a run: a rig, a pilot, its cases, what is measured and expected."""
     if rig:
         check_new(file, ".toml")
-        write_new(file, _run_for(rig, control, file), ".toml", f"coupled compare {_word(file)}")
+        write_new(file, _run_for(rig, control, file), ".toml", f"coupled compare {word_of(file)}")
         return
     if control != "column":
         raise InputError("new run", "--control", "goes with --rig; the starter pulls the column")
-    write_new(file, _text("run.toml"), ".toml", f"coupled compare {_word(file)}")
+    write_new(file, _text("run.toml"), ".toml", f"coupled compare {word_of(file)}")
 
 
 @new.command(epilog="[dim]Example: coupled new sweep s.toml, then coupled sweep ./s.toml[/]")
@@ -52,7 +53,7 @@ def sweep(
     file: Annotated[Path, typer.Argument(help="The new file.")] = Path("my-sweep.toml"),
 ) -> None:
     """Write a sweep: a run flown over two of its parameters."""
-    write_new(file, _text("sweep.toml"), ".toml", f"coupled sweep {_word(file)}")
+    write_new(file, _text("sweep.toml"), ".toml", f"coupled sweep {word_of(file)}")
 
 
 @new.command(
@@ -62,7 +63,7 @@ def map_(
     file: Annotated[Path, typer.Argument(help="The new file.")] = Path("my-map.toml"),
 ) -> None:
     """Write the map of a log: its columns as channels, with units, signs and clock."""
-    write_new(file, _text("map.toml"), ".toml", f"coupled import LOG --map {_word(file)}")
+    write_new(file, _text("map.toml"), ".toml", f"coupled import LOG --map {word_of(file)}")
 
 
 @new.command(
@@ -83,7 +84,7 @@ def readings(
     if control not in CONTROL_NAMES:
         hint = nearest(control, CONTROL_NAMES)
         raise InputError("new readings", "--control", f"no {control!r}; {hint}")
-    then = f"coupled calibrate {_word(file)} --rig RIG --control {control}"
+    then = f"coupled calibrate {word_of(file)} --rig RIG --control {control}"
     write_new(file, starting_form(control, inches), ".csv", f"fill it in, then: {then}")
 
 
@@ -120,12 +121,13 @@ def feel(
 def _run_for(rig: str, control: str, file: Path) -> str:
     """Return the text of a run for a rig, after a flight of its cases."""
     from coupled.authority.firstrun import first_run
+    from coupled.rig.parameters import plain_name
 
     rig_file, data, name = rig_and_control(rig, control)
     shipped = shipped_rigs().get(rig) == rig_file
     word = rig if shipped else path_from(file.parent, rig_file)
     with progress() as advance:
-        return first_run(data, name, word, file.stem, advance)
+        return first_run(data, name, word, plain_name(file.stem), advance)
 
 
 def check_new(file: Path, suffix: str) -> None:
@@ -152,7 +154,6 @@ def _text(name: str) -> str:
     return read_text(starter(name), "it was shipped as such")
 
 
-def _word(file: Path) -> str:
+def word_of(file: Path) -> str:
     """Return the file as a command takes it."""
-    text = str(file)
-    return f"'{text}'" if " " in text else text
+    return shlex.quote(str(file))

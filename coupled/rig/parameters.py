@@ -8,6 +8,7 @@ effect out. Signs: pull, clockwise and right foot forward are positive.
 from __future__ import annotations
 
 import re
+import unicodedata
 from itertools import pairwise
 from typing import Annotated, Any, Literal
 
@@ -38,6 +39,14 @@ PlainName = Annotated[
         " at most 80 characters",
     ),
 ]
+
+
+def plain_name(text: str) -> str:
+    """Return the nearest valid name: without accents, other characters as dashes."""
+    plain = unicodedata.normalize("NFKD", text).encode("ascii", "ignore").decode()
+    return re.sub("[^A-Za-z0-9_.]+", "-", plain).strip("-_.")[:80] or "unnamed"
+
+
 MAX_ROWS = 32  # of a schedule's table
 MAX_NODES = 64  # deflections of a curve
 DELAY_SLOTS = 1024  # of the loader's force history, in substeps; a power of two

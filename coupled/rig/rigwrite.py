@@ -81,11 +81,16 @@ def _mapping(path: str, values: dict[str, float]) -> list[str]:
     return ["", f"[{path}]", *lines] if lines else []
 
 
+def toml_string(text: str) -> str:
+    """Return a text in quotes, with quotes and line ends in it escaped."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
 def _shown(value: Any) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False)
+        return toml_string(value)
     if isinstance(value, list):
         return "[" + ", ".join(_shown(item) for item in value) + "]"
     return repr(value)

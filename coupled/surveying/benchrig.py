@@ -12,9 +12,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from coupled.display import System, in_system
-from coupled.errors import InputError, nearest
+from coupled.errors import InputError, nearest, shown
 from coupled.record.channels import ControlName, unit_of
 from coupled.rig.bounds import REACHED
+from coupled.rig.rigwrite import toml_string
 from coupled.surveying.draft import HOW_TO_SETTLE, BEND_m_per_N, RIM_m, control_lines, kind_of
 from coupled.surveying.fromlog import LogNumbers
 from coupled.units import parse_unit
@@ -184,11 +185,11 @@ def bench_rig(
         friction_N=values["friction"],
     )
     lines = [
-        f"# {name}: a {control} on the bench, without an aircraft, by `coupled new rig`.",
+        f"# {shown(name)}: a {control} on the bench, without an aircraft, by `coupled new rig`.",
         "#",
         *HOW_TO_SETTLE,
         "",
-        f'name = "{name}"',
+        f"name = {toml_string(name)}",
         f"frame_rate_Hz = {rate_Hz!r}",
         *control_lines(
             control,

@@ -8,12 +8,12 @@ control's does, up to a greatest force at full travel; K is that of Cleveland's 
 
 from __future__ import annotations
 
-import json
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 from coupled.record.channels import SURFACES, ControlName, unit_of
 from coupled.rig.bounds import pressure_at
+from coupled.rig.rigwrite import toml_string
 from coupled.surveying.survey import Surveyed
 
 BEND_m_per_N = 9.136e-5  # 0.016 in/lb, the report's column
@@ -92,7 +92,7 @@ def draft(found: Surveyed, name: str, folder: str = "", airframe_only: bool = Fa
     """
     if airframe_only:
         head = [f"# {found.model}: an aircraft without controls, written by `coupled new rig`."]
-        head += ["", f'name = "{name}"', "frame_rate_Hz = 120.0"]
+        head += ["", f"name = {toml_string(name)}", "frame_rate_Hz = 120.0"]
         return "\n".join([*head, *_flight(found, folder), ""])
     kind = kind_of(found.mass_kg)
     said = f"its empty mass of {found.mass_kg:,.0f} kg" if found.mass_kg else "no mass in its file"
@@ -103,7 +103,7 @@ def draft(found: Surveyed, name: str, folder: str = "", airframe_only: bool = Fa
         f"# for {kind.name} (by {said}).",
         *HOW_TO_SETTLE,
     ]
-    lines += ["", f'name = "{name}"', "frame_rate_Hz = 120.0", *_flight(found, folder)]
+    lines += ["", f"name = {toml_string(name)}", "frame_rate_Hz = 120.0", *_flight(found, folder)]
     for control in found.controls:
         lines += _control(control, kind.controls[control], found)
     for lack in found.lacking:
@@ -115,11 +115,11 @@ def _flight(found: Surveyed, folder: str) -> list[str]:
     flight = found.flight
     assert flight is not None
     holds = "holds it hands off" if found.holds else "does not hold it hands off: fly short runs"
-    lines = ["", "[flight]", f"model = {json.dumps(flight.model)}"]
+    lines = ["", "[flight]", f"model = {toml_string(flight.model)}"]
     if folder:
-        lines.append(f"model_folder = {json.dumps(folder)}  # where {flight.model}/ lies")
+        lines.append(f"model_folder = {toml_string(folder)}  # where {flight.model}/ lies")
     if flight.model_file:
-        lines.append(f"model_file = {json.dumps(flight.model_file)}")
+        lines.append(f"model_file = {toml_string(flight.model_file)}")
     lines.append(f"altitude_m = {flight.altitude:g}               # it trims here, and {holds}")
     speed = f"calibrated_airspeed_m_per_s = {flight.calibrated_airspeed:g}"
     if found.slowest < found.fastest:
@@ -215,7 +215,7 @@ def control_lines(
         "",
         f"[{at}]",
         f'surface = "{SURFACES[control]}"',
-        *([f"surface_property = {json.dumps(position)}"] if position else []),
+        *([f"surface_property = [{', '.join(map(toml_string, position))}]"] if position else []),
         *(row(*each) for each in own),
         *(["guesses = [", *guesses, "]"] if guesses else []),
         "",

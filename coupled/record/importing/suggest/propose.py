@@ -30,6 +30,7 @@ from coupled.record.importing.suggest.ends import settle_ends
 from coupled.record.importing.suggest.names import is_torque, words_of
 from coupled.rig.parameters import Control
 from coupled.rig.rig import Rig
+from coupled.rig.rigwrite import toml_string
 from coupled.schema import file_keys
 from coupled.units import Unit, parse_unit, units_like
 
@@ -79,7 +80,7 @@ def propose(files: Sequence[Path], rig: Rig | None = None) -> Proposal:
     chosen, asked = settle_ends(chosen)
     clock, clocks = _clocks(_stamps_first(columns, read, chosen), logs)
     sections = [("log", _layout_lines(layout, far)), ("clock", clock)]
-    sections += [(f"clocks.{json.dumps(name)}", lines) for name, lines in clocks.items()]
+    sections += [(f"clocks.{toml_string(name)}", lines) for name, lines in clocks.items()]
     for channel in CHANNELS:
         if channel in chosen:
             control = _control(channel, rig)
