@@ -143,7 +143,7 @@ def _asked(
     data.check_controlled(data.file)
     if control not in data.controls:
         problem = f"the rig has no {control}; {nearest(control, data.controls)}"
-        raise InputError(data.name, "controls", problem)
+        raise InputError(data.place, "controls", problem)
     return data, instruments or usual_instruments(control)
 
 

@@ -53,7 +53,7 @@ def export(
             raise InputError(", ".join(named), "case", problem)
         data, cases = chosen[case].rig, [chosen[case]]
     flown, _ = exportable(data, cases)
-    made = make(data, flown, data.file or data.name, loader_rate_Hz, check, progress)
+    made = make(data, flown, data.place, loader_rate_Hz, check, progress)
     write_export(made, place)
     return made
 

@@ -58,7 +58,7 @@ def first_run(
     data = rig.controls[control]
     if data.drive == "setpoint":
         problem = "a setpoint has no loader that a force moves; write the run by hand"
-        raise InputError(rig.name, f"controls.{control}.drive", problem)
+        raise InputError(rig.place, f"controls.{control}.drive", problem)
     said = progress or (lambda what, done, total: None)
     tries = _tries(rig, control, said)
     cases, refused = [], list[InputError]()
@@ -72,7 +72,7 @@ def first_run(
         if refused:
             raise refused[0]
         what = "speeds" if rig.flight is not None else "forces"
-        raise InputError(rig.name, "", f"no pull of {_DURATION_s:g} s flies at any of its {what}")
+        raise InputError(rig.place, "", f"no pull of {_DURATION_s:g} s flies at any of its {what}")
     return "\n".join([*_head(rig, control, word, name, cases), *_expectations(control, cases), ""])
 
 

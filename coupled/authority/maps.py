@@ -16,9 +16,9 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from coupled.errors import InputError
+from coupled.errors import InputError, collected
 from coupled.flight.aircraft import make_aircraft
-from coupled.flight.airframe import JSBSimAirframe
+from coupled.flight.airframe import UNTRIMMED, JSBSimAirframe
 from coupled.flight.altered import STILL
 from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import CONFIGURATIONS, Configuration, configure
@@ -153,21 +153,25 @@ def shipped_flights(rig: Rig, progress: Progress) -> list[Record]:
 
 
 def feel(rig: Rig, file: Path, progress: Progress) -> Feel | None:
-    """Return the stick forces; None for a bench, without a column, or without any trim."""
+    """Return the stick forces; None for a bench, without a column, or without any trim.
+
+    Raises InputError for an aircraft that does not fly for another reason.
+    """
     if rig.flight is None or "column" not in rig.controls:
         return None
     table = rig.controls["column"].schedule
     ends = [max(min(table.dynamic_pressure), _LEAST_PRESSURE_Pa), max(table.dynamic_pressure)]
     slowest, fastest = (math.sqrt(2.0 * q / _SEA_LEVEL_kg_per_m3) for q in ends)
     speeds = np.linspace(slowest, fastest, _SPEEDS)
-    found = []
+    found, refused = [], list[InputError]()
     for i, speed in enumerate(speeds.tolist()):
         progress(f"{speed / KNOT_m_per_s:.0f} kt", i, _SPEEDS)
-        try:
+        with collected(refused):  # no level flight at this speed
             found.append((speed, *_elevator_per(rig, file, speed)))
-        except InputError:
-            continue  # no level flight at this speed
     if not found:
+        other = next((one for one in refused if one.key != f"flight.{UNTRIMMED}"), None)
+        if other is not None:
+            raise other
         return None
     speed, pressure, per_g, per_knot = np.array(found).T
     rigs = {name: configure(rig, name) for name in FELT}

@@ -76,7 +76,7 @@ def map_rig(
 
     rig.check_controlled(rig.file)
     flown = shipped_flights(rig, tell) if records is None else list(records)
-    felt = feel(rig, rig.file or Path(rig.name), tell)
+    felt = feel(rig, Path(rig.place), tell)
     maps = {}
     for done, name in enumerate(rig.controls):
         tell(f"{name}: losses over q̄ and deflection", done, len(rig.controls))

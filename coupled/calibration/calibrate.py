@@ -63,7 +63,7 @@ def calibrate(
     rig.check_controlled(rig.file)
     if control not in rig.controls:
         problem = f"the rig has no {control}; {nearest(control, rig.controls)}"
-        raise InputError(rig.name, "controls", problem)
+        raise InputError(rig.place, "controls", problem)
     file: Path | str = "readings"
     if not isinstance(readings, Readings):
         file = Path(readings)

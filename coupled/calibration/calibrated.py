@@ -60,10 +60,10 @@ def with_calibration(
     """
     if control not in rig.controls:
         problem = f"the rig has no {control}; {nearest(control, rig.controls)}"
-        raise InputError(rig.file or rig.name, "controls", problem)
+        raise InputError(rig.place, "controls", problem)
     if found.control != control:
         problem = f"the calibration is of the {found.control}, not of the {control}"
-        raise InputError(rig.file or rig.name, control, problem)
+        raise InputError(rig.place, control, problem)
     data, d = rig.controls[control], unit_of(control)
     place, sensing = f"controls.{control}", data.sensing
     bend = found.line.bend

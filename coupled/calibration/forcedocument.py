@@ -80,7 +80,7 @@ def document_rig(
     says what is specified, `aircraft` the aircraft's own forces. Raises InputError where the rig
     lacks the control, or a file cannot be used.
     """
-    file = rig.file or Path(rig.name)
+    file = Path(rig.place)
     rig.check_controlled(file)
     if control is not None and control not in rig.controls:
         raise InputError(file, "control", f"no {control!r}; {nearest(control, rig.controls)}")

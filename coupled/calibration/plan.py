@@ -71,7 +71,7 @@ def gradient_sets(rig: Rig, control: ControlName, count: int) -> list[tuple[floa
     if gradients[high] <= gradients[low] * (1.0 + 1e-6):
         key = f"controls.{control}.schedule"
         problem = "has one gradient only, which does not separate S1 from K; give a second"
-        raise InputError(rig.name, key, problem)
+        raise InputError(rig.place, key, problem)
     way = slice(low, high + 1) if low < high else slice(high, low + 1)
     fine = np.linspace(pressures[way][0], pressures[way][-1], 4001)
     along = specified_gradient(table, fine)
@@ -114,7 +114,7 @@ def _reach(rig: Rig, control: ControlName, pressure: float, strongest_N: float) 
     leaves = static_line(rig, control, pressure, np.array([_LEAVES * full]))
     if leaves.force[0] >= strongest_N:
         problem = f"{strongest_N:g} N does not overcome the breakout; give more"
-        raise InputError(rig.name, "--strongest-N", problem)
+        raise InputError(rig.place, "--strongest-N", problem)
     return float(brentq(excess, float(leaves.deflection[0]), full, rtol=1e-6))
 
 
@@ -159,7 +159,7 @@ def fewest(
                 return [(s, int(n)) for s, n in zip(grid, counts, strict=True) if n]
         counts[_most_helpful(rows, information, c)] += 1
     problem = f"{MOST_READINGS} readings do not give K to ±{100 * share:g} %; ask for less"
-    raise InputError(rig.name, "--precision", problem)
+    raise InputError(rig.place, "--precision", problem)
 
 
 def _ends(rows: Floats) -> list[int]:

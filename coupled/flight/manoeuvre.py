@@ -165,7 +165,7 @@ class Manoeuvre:
     @property
     def rig_file(self) -> object:
         """The rig's name in faults: its file, or else its name."""
-        return self.source.rig_file if self.source is not None else self.rig.name
+        return self.source.rig_file if self.source is not None else self.rig.place
 
     @property
     def _rig_name(self) -> str:

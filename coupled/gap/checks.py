@@ -559,8 +559,8 @@ def other_air(density: float, file: str) -> str:
 def _in_trim(rig: Rig, name: str) -> float:
     """Return a channel of the motion of the rig's aircraft in trim."""
     assert rig.flight is not None
-    still = changed(rig.flight, STILL, rig.name, "flight")
-    motion = _trim_motion(still.model_dump_json(), rig.frame_rate, rig.name)
+    still = changed(rig.flight, STILL, rig.place, "flight")
+    motion = _trim_motion(still.model_dump_json(), rig.frame_rate, rig.place)
     return motion[LONGITUDINAL.index(name)]
 
 
@@ -614,7 +614,7 @@ def check_moved_by_pilot(rig: Rig, records: Mapping[str, Record]) -> None:
         if points is None and control == "column":
             problem = "has control laws that move its elevator, which follow the column's command;"
             remedy = "give a rig with [controls.column], and a record with column_estimate_m"
-            raise InputError(rig.name, key, f"{model} {problem} {remedy}")
+            raise InputError(rig.place, key, f"{model} {problem} {remedy}")
         recorded = (file for file, one in records.items() if name in one and np.ptp(one[name]) > 0)
         file = next(recorded, None)
         if points is None or np.ptp(points[1]) > KNOWN or file is None:
@@ -622,4 +622,4 @@ def check_moved_by_pilot(rig: Rig, records: Mapping[str, Record]) -> None:
         problem = f"{model} does not move {PROPERTIES[name]}, the position of {name} in {file};"
         own = f"give a rig with [controls.{control}] and its surface_property"
         remedy = own if control == "column" else f"{own}, or the record without {name}"
-        raise InputError(rig.name, key, f"{problem} {remedy}")
+        raise InputError(rig.place, key, f"{problem} {remedy}")

@@ -75,7 +75,7 @@ def diagnose(
     tried. Raises InputError if a record cannot be of this rig, or if no stage can be judged.
     """
     if terms and rig.flight is None:
-        raise InputError(rig.name, TERMS_OPTION, "the rig has no aircraft; leave it out")
+        raise InputError(rig.place, TERMS_OPTION, "the rig has no aircraft; leave it out")
     with threads(workers):
         parts, words = parts_of(rig, records, control)
         well = _of_parts(rig, healthy, list(parts)) if healthy else {}
@@ -118,7 +118,7 @@ def parts_of(
     if not rig.controls:
         if control is not None:
             problem = f"the rig is an aircraft alone, without a {control}; leave it out"
-            raise InputError(rig.name, "--control", problem)
+            raise InputError(rig.place, "--control", problem)
         return {Part("column", own=False): records}, ()
     if control is not None:
         return {Part(control): records}, ()

@@ -276,7 +276,7 @@ def _flown_as_recorded(
         return dict.fromkeys(records, rig)
     if not keys:
         problem = 'the rig has an aircraft only: give its keys, as "flight.pitch_damping"'
-        raise InputError(rig.file or rig.name, "--free", problem)
+        raise InputError(rig.place, "--free", problem)
     return trimmed(rig if rig.controls else at_rate_of(rig, records), records)[0]
 
 

@@ -27,6 +27,7 @@ from coupled.record.channels import (
     noisy_channels,
     unit_of,
 )
+from coupled.resources import aircraft_folder
 from coupled.results import Result
 from coupled.rig.bounds import check_bounds
 from coupled.rig.curves import check_curves
@@ -124,6 +125,12 @@ class Rig(RigData, Result):
         return None if self._filed is None else self._filed[0]
 
     @property
+    def place(self) -> str:
+        """What faults call the rig: its file, or the name of a shipped one or one without file."""
+        shipped = self.file is None or self.file.is_relative_to(aircraft_folder())
+        return self.name if shipped else str(self.file)
+
+    @property
     def substeps(self) -> int:
         """The number of loader steps in a frame."""
         return max(1, -int(-self.loader_rate // self.frame_rate))
@@ -206,7 +213,7 @@ def _changed_controls(rig: Rig, changes: Mapping[str, Any]) -> dict[str, Control
     for name, values in grouped(inner).items():
         if name not in rig.controls:
             problem = f"the rig has no {name}; {nearest(name, rig.controls)}"
-            raise InputError(rig.name, f"controls.{name}", problem)
+            raise InputError(rig.place, f"controls.{name}", problem)
         if "" in values:
             controls[name] = _control(rig, name, values[""])
         else:

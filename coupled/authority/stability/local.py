@@ -57,7 +57,7 @@ def _of_control(rig: Rig, name: str, control: Control) -> dict[str, Any]:
             local = filed * slope if curve.MAP else filed + slope
             if local < 0.0 or (curve.MAP and local == 0.0):
                 problem = f"makes {number} {local:.4g} for small motions; their stability is"
-                raise InputError(rig.file or rig.name, f"{path}.{key}", f"{problem} not found")
+                raise InputError(rig.place, f"{path}.{key}", f"{problem} not found")
             found |= {f"{path}.{number}": local, f"{path}.{key}": {}}
             push = f"bend_push_{d}_per_N"
             if key == "bend_curve" and control.loader.bend_push is not None:

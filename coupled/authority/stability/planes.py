@@ -160,9 +160,9 @@ def _linear(rig: Rig, name: ControlName, gradient: float) -> Rig:
         "compensation.damping_factor": None,
         f"loader.bend_push_{d}_per_N": None,
     }
-    alone = {name: changed(control, linear, rig.name, f"controls.{name}", d)}
+    alone = {name: changed(control, linear, rig.place, f"controls.{name}", d)}
     whole = {"controls": alone, "flight": None, "noise": {}, "structure": Structure()}
-    return changed(rig, whole, rig.name)
+    return changed(rig, whole, rig.place)
 
 
 def _with_values(linear: Rig, name: ControlName, question: Question) -> Rig:

@@ -106,7 +106,7 @@ def compliant_controls(
 
     Raises InputError, which names the control `key`, where the rig lacks it, or none bends.
     """
-    file = rig.file or Path(rig.name)
+    file = Path(rig.place)
     rig.check_controlled(file)
     names = [name for name in rig.controls if control in (None, name)]
     if not names:
@@ -127,7 +127,7 @@ def map_stability(
     rig = about_rest(rig)
     asked = [(name, kind) for name in bent for kind in kinds_of(rig.controls[name])]
     limits = tuple(stability_limits(rig, name) for name in bent)
-    bob = bob_weight(rig, rig.file or Path(rig.name)) if "column" in bent else None
+    bob = bob_weight(rig, Path(rig.place)) if "column" in bent else None
     return Stability(rig, limits, _planes(rig, asked, progress), bob)
 
 

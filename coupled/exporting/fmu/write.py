@@ -84,7 +84,7 @@ def make_fmu(rig: Rig, control: str = "", fmi: Fmi = 3) -> Fmu:
 
     Raises InputError for an unknown control, and without a C compiler.
     """
-    file = rig.file or rig.name
+    file = rig.place
     name = chosen_control(rig, control, file)
     made_for = this_platform()
     c_compiler()

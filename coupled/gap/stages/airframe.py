@@ -276,7 +276,7 @@ class Model:
 def _in_time(rig: Rig) -> Flight:
     """Return the aircraft of a rig whose motion has no late time stamps."""
     assert rig.flight is not None
-    return changed(rig.flight, {"motion_stamp_s": 0.0}, rig.name, "flight")
+    return changed(rig.flight, {"motion_stamp_s": 0.0}, rig.place, "flight")
 
 
 def has_gusts(flight: Flight) -> bool:

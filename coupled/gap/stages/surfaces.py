@@ -105,7 +105,7 @@ def surface_points(rig: Rig, control: ControlName) -> Points | None:
 def _unaltered(rig: Rig) -> tuple[str, tuple[ControlName, ...], float]:
     """Return the aircraft of a rig without its alterations (JSON), its controls and frame rate."""
     assert rig.flight is not None
-    plain = changed(rig.flight, UNALTERED, rig.name, "flight")
+    plain = changed(rig.flight, UNALTERED, rig.place, "flight")
     return plain.model_dump_json(), flown_by(rig), rig.frame_rate
 
 
@@ -156,15 +156,15 @@ def _moves_itself(
 def filed_trim(rig: Rig, control: ControlName) -> float:
     """Return a surface's position in the trim to which `surface_points` refers, rad."""
     flight, controls, rate_Hz = _unaltered(rig)
-    return _trim(flight, controls, rate_Hz, rig.name)[controls.index(control)]
+    return _trim(flight, controls, rate_Hz, rig.place)[controls.index(control)]
 
 
 def own_trim(rig: Rig, control: ControlName) -> float:
     """Return a surface's position in the trim of the rig's own aircraft, rad."""
     assert rig.flight is not None
-    still = changed(rig.flight, STILL, rig.name, "flight")
+    still = changed(rig.flight, STILL, rig.place, "flight")
     controls = flown_by(rig)
-    each = _trim(still.model_dump_json(), controls, rig.frame_rate, rig.name)
+    each = _trim(still.model_dump_json(), controls, rig.frame_rate, rig.place)
     return each[controls.index(control)]
 
 

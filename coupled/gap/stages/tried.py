@@ -127,7 +127,7 @@ def lacking_keys(rig: Rig) -> set[str]:
     """Return the keys of the factors on parts that a rig's model lacks."""
     if rig.flight is None:
         return set()
-    parts = parts_of(main_file(rig.flight, [aircraft_folder()], rig.name))
+    parts = parts_of(main_file(rig.flight, [aircraft_folder()], rig.place))
     return {f"flight.{key}" for key in PARTS - parts}
 
 
@@ -272,10 +272,10 @@ def with_terms(library: Sequence[Effect], rig: Rig, records: Mapping[str, Record
     the airframe needs.
     """
     assert rig.flight is not None
-    axes = functions_of(main_file(rig.flight, [aircraft_folder()], rig.name))
+    axes = functions_of(main_file(rig.flight, [aircraft_folder()], rig.place))
     if not axes:
         problem = f"{rig.flight.model} has no named aerodynamic functions; leave it out"
-        raise InputError(rig.name, TERMS_OPTION, problem)
+        raise InputError(rig.place, TERMS_OPTION, problem)
     large = set[str]()
     for file, record in records.items():
         lacking = [name for name in needs(rig, record) if name not in record]
