@@ -45,6 +45,7 @@ FORMATS = {
     **dict.fromkeys((".json", ".jsonl", ".ndjson"), "json"),
 }
 _QUOTED_COMMA = re.compile(r'"\s*[-+]?\d*,\d')
+_MINUS = r"(^|[eE])\u2212([\d.,])"  # the mathematical sign, as of Swedish and Norwegian settings
 LATEST_ns = 1e19  # a clock in ns since 1970 is larger than any quantity of a record
 
 
@@ -344,7 +345,7 @@ def _rows(text: str, layout: Layout) -> tuple[list[str], list[int]]:
 
 
 def _cells(column: pl.Series, layout: Layout) -> pl.Series:
-    cells = column.str.strip_chars()
+    cells = column.str.strip_chars().str.replace_all(_MINUS, "$1-$2")
     if layout.missing:
         cells = cells.set(cells.is_in(layout.missing).fill_null(False), None)
     return cells

@@ -244,3 +244,15 @@ def test_dates_of_a_parquet_file_need_no_pattern(tmp_path: Path) -> None:
     assert suggested(tmp_path / "log.parquet")["clock"] == {"from": "x"}
     record, _ = import_log(tmp_path / "log.parquet", tmp_path / "map.toml")
     np.testing.assert_array_equal(record[FORCE], FORCE_N[:ROWS])
+
+
+@pytest.mark.parametrize("decimal", [".", ","])
+def test_a_mathematical_minus_is_read(tmp_path: Path, decimal: str) -> None:
+    pull = FORCE_N[: TIME_s.size]
+    rows = [f"{t:.6f};{f:.6f};{1e-3 * f:.6E}" for t, f in zip(TIME_s, pull, strict=True)]
+    body = "\n".join(rows).replace("-", "\u2212").replace(".", decimal)
+    head = "time [s];column force [N];column encoder [m]\n"
+    (tmp_path / "log.csv").write_text(f"{head}{body}\n", encoding="utf-8")
+    record, _ = imported_as_suggested(tmp_path / "log.csv")
+    np.testing.assert_allclose(record["column_force_N"], pull, atol=1e-6)
+    np.testing.assert_allclose(record["column_computed_m"], 1e-3 * pull, rtol=1e-6)

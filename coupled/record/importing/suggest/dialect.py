@@ -20,10 +20,10 @@ LOOKED_AT = 400  # lines from which the layout is guessed
 COMMENTS = ("#", "%", "//", "*")
 DELIMITERS = ("\t", ";", ",", " ")  # a semicolon before a comma, which may be the decimal mark
 MOST_WORDS = 5
-_NUMBER = re.compile(r"[-+]?(\d+[.,]?\d*|[.,]\d+)([eE][-+]?\d+)?")
-_COMMA = re.compile(r"[-+]?\d*,\d+([eE][-+]?\d+)?")
+_NUMBER = re.compile(r"[-+\u2212]?(\d+[.,]?\d*|[.,]\d+)([eE][-+\u2212]?\d+)?")
+_COMMA = re.compile(r"[-+\u2212]?\d*,\d+([eE][-+\u2212]?\d+)?")
 _STAMP = re.compile(r"\d.*\d:\d\d|\d:\d\d")  # the first cell of a row without a header
-_THOUSANDS = re.compile(r"[-+]?[1-9]\d{0,2},\d{3}")
+_THOUSANDS = re.compile(r"[-+\u2212]?[1-9]\d{0,2},\d{3}")
 
 
 def guess_layout(path: Path) -> Layout:
