@@ -123,7 +123,7 @@ def _remembered(
 ) -> Group:
     """Return a fit from the cache; a fit that starts at the optimum of another one is that fit.
 
-    The cache keeps no Jacobian, since they are large; that of a fit that ended here is in `descent`.
+    Its Jacobians are large, and not kept; that of a fit that ended here is in `descent`.
     """
     ours, known = touched(case.outputs, members), descent.known
     if descent.most < WHOLE.most and parent is not None:
