@@ -10,8 +10,11 @@
    It is small for a wrong effect, since functions of the signals remove the same. The comparison is
    omitted for effects from outside the stage, such as gusts. The motion of an aircraft is no
    function of its present signals, so the residual of the airframe counts in full.
+3. Outputs without a gap. If an output is within its noise without effects, a cause acts on it by
+   less than its noise. An effect that acts by more is undone there by another one, of which the
+   record shows nothing, or itself undoes one.
 
-Both tests weigh more the more residual power remains (`remainder`). The result is one smooth
+The first two weigh more the more residual power remains (`remainder`). The result is one smooth
 number that scales the effect's probability.
 """
 
@@ -187,7 +190,8 @@ class Credibility:
     `remainder` is the weight of the residual that remains, 0 to 1 (`remainder`). `beside_flexible`
     is None if hardly any residual remains. `in_full`: no residual may remain, since the model of
     signals has no power. `exact`: the stage is computed by the host without noise, so the limit of
-    the drift is lower too.
+    the drift is lower too. `undone` is the power of the effect in outputs without a gap, beyond
+    that of which their noise has room, relative to this power.
     """
 
     effect: str
@@ -196,6 +200,7 @@ class Credibility:
     remainder: float = 0.0
     exact: bool = False
     in_full: bool = False
+    undone: float = 0.0
 
     @property
     def drift(self) -> float:
@@ -218,6 +223,7 @@ class Credibility:
     def value(self) -> float:
         """The credibility: 1 for a stationary size that the signals do not replace, down to 0."""
         same = 1.0 / (1.0 + (self.drift / (HOST_DRIFT if self.exact else DRIFT)) ** 4)
+        same /= 1.0 + self.undone**2
         if self.exact or self.in_full:
             return same * (1.0 - self.remainder)
         if self.beside_flexible is None:
@@ -228,6 +234,8 @@ class Credibility:
     def as_dict(self) -> dict[str, Any]:
         """Return the JSON."""
         found: dict[str, Any] = {"value": self.value, "drift": self.drift, "p": self.p_value}
+        if self.undone > 0.0:
+            found["undone"] = self.undone
         if self.beside_flexible is not None:
             found |= {"remainder": self.remainder, "beside_flexible": self.beside_flexible}
         return found | {"regimes": [one.as_dict() for one in self.regimes]}
@@ -254,7 +262,8 @@ def credibility(
 ) -> Credibility:
     """Return an effect's credibility; `remains` is the weight of the residual (`remainder`)."""
     acts = [Acts(one, records[one.record], *each) for one, *each in case.actions(found, effect)]
-    plain = Credibility(effect.name, regimes(case, acts), remainder=remains)
+    undone = _undone(case, found, acts)
+    plain = Credibility(effect.name, regimes(case, acts), remainder=remains, undone=undone)
     if effect.stage == "schedule":
         return replace(plain, exact=True)
     if remains < FEW or not acts or effect.signature.drawing == "time":
@@ -263,6 +272,21 @@ def credibility(
         return replace(plain, in_full=True)
     most = max(acts, key=lambda one: float(one.action @ one.action))
     return replace(plain, beside_flexible=_beside_flexible(case, found, most))
+
+
+def _undone(case: Case, found: Fit, acts: Sequence[Acts]) -> float:
+    """Return by how much an effect acts on outputs that have no gap without effects (`undone`).
+
+    The nuisance parameters are those fitted with the effects.
+    """
+    if len(found.effects) < 2:
+        return 0.0
+    bare, most = case.with_only(found, ()), 0.0
+    for one in acts:
+        room = one.output.limit**2 - 1.0
+        if one.output.gap(bare) <= one.output.limit:
+            most = max(most, float(np.mean(one.action**2)) / room - 1.0)
+    return most
 
 
 def _beside_flexible(case: Case, found: Fit, one: Acts) -> float:
