@@ -261,6 +261,36 @@ def test_a_hysteresis_of_the_pressure_is_no_lag(lag_s: float, width_Pa: float) -
     assert found.value > 0.99 if lag_s else found.value < 0.1
 
 
+@pytest.mark.parametrize("acts", [0.0, 1.0])
+def test_effects_that_undo_each_other_where_there_is_no_gap_are_not_the_cause(acts: float) -> None:
+    """A force computed from the record's own deflection was a product held by the host.
+
+    The change that this makes of the motion was undone by 13 % more damping, at 0.89 both.
+    """
+    rng, frames = np.random.default_rng(6), 3000
+    first, second, noise, more = rng.normal(size=(4, frames))
+    offset, weight = BY_NAME["force_offset"], BY_NAME["bob_weight"]
+
+    def moved(rig: Rig) -> NDArray[np.float64]:
+        loader = rig.controls["column"].loader
+        return np.asarray((loader.offset + loader.bob_weight) * first)
+
+    def shown(rig: Rig) -> NDArray[np.float64]:
+        return np.asarray(rig.controls["column"].loader.offset * second)
+
+    outputs = [
+        Output("loader", "x", acts * 8.0 * first + noise, moved, 1.0, 120.0),
+        Output("loader", "y", 5.0 * second + more, shown, 1.0, 120.0),
+    ]
+    case = Case(bench(), "column", outputs)
+    fitted = Problem(case).fit((offset, weight))
+    record = Record(("time_s",), np.arange(frames)[:, None] / 120.0)
+    for effect in (offset, weight):
+        found = credibility(effect, case, fitted, [record], 0.0)
+        assert found.value > 0.99 if acts else found.value < 0.01
+        assert (found.undone > 1.0) == (not acts)
+
+
 @pytest.mark.parametrize(("remains", "value"), [(0.0, 1.0), (0.9, 0.1)])
 def test_what_remains_of_an_exact_stage_is_held_against_an_effect(
     remains: float, value: float

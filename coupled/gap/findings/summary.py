@@ -324,12 +324,21 @@ def _sure(found: Findings) -> str:
     if found.verdict == "unexplained":
         most = max(effect.probability for effect in found.effects)
         if most < CERTAIN:
-            return f"No effect is certain: their probability is {most:.2f} at most."
+            return f"No effect is certain: their probability is {most:.2f} at most.{_undone(found)}"
         return "The effects that are certain hold less than half of the gap."
     each = {plain(effect.name): f"{effect.probability:.2f}" for effect in found.effects}
     if len({*each.values()}) > 1:
         return f"Probabilities: {', '.join(f'{name} {p}' for name, p in each.items())}."
     return f"Probability {min(each.values())}."
+
+
+def _undone(found: Findings) -> str:
+    """Return a sentence on effects that undo each other where the record has no gap."""
+    known = [(plain(e.name), e.credibility) for e in found.effects]
+    names = [name for name, tests in known if tests is not None and tests.undone > 1.0]
+    if len(names) < 2:
+        return ""
+    return f" {capital(' and '.join(names))} undo each other where the record has no gap."
 
 
 def closes(shrink: Shrink) -> str:
