@@ -44,7 +44,7 @@ from coupled.gap.signals.output import Floats, estimate_noise
 from coupled.gap.signals.reading import Reading
 from coupled.gap.stages.airframe import needs
 from coupled.gap.stages.surfaces import surface_points
-from coupled.gap.stages.tried import TERMS_OPTION
+from coupled.gap.stages.tried import TERMS_OPTION, untried_terms
 from coupled.gap.thresholds import DOUBLED, MOST, TINY
 from coupled.parallel import in_threads, threads
 from coupled.record.channels import CONTROL_NAMES, ControlName, channel
@@ -255,7 +255,11 @@ def findings(prepared: Prepared, case: Case, choice: Choice) -> PartDiagnosis:
             for one in effects
         )
         verdict = "ambiguous" if verdict in ("effect", "mostly") else verdict
-    lone = lone_channel(outputs, case.nominal) if verdict == "unexplained" else ""
+    lone, untried = "", ""
+    if verdict == "unexplained":
+        lone = lone_channel(outputs, case.nominal)
+    if verdict == "unexplained" and AIRFRAME in faulty and not lone:
+        untried = untried_terms(prepared.library, case.nominal)
     verdict, stages = beside_healthy(verdict, stages, baseline, change)
     filtered = (one.filtered().items() for one in readers) if part.own else ()
     return PartDiagnosis(
@@ -282,7 +286,7 @@ def findings(prepared: Prepared, case: Case, choice: Choice) -> PartDiagnosis:
         change=change,
         trim=prepared.trim,
         filtered={name: one for each in filtered for name, one in each},
-        left_out=tuple(words for words in (*prepared.left_out, lone, unknown) if words),
+        left_out=tuple(words for words in (*prepared.left_out, lone, unknown, untried) if words),
         inseparable=inseparable(fit, case.control),
         curved=curves,
     )

@@ -26,7 +26,7 @@ from coupled.gap.search.beam import search_sets
 from coupled.gap.search.case import Case
 from coupled.gap.search.found import Candidate, Choice, Fit, Found
 from coupled.gap.signals.output import Output
-from coupled.gap.stages.tried import tried_effects, with_terms
+from coupled.gap.stages.tried import tried_effects, untried_terms, with_terms
 from coupled.gap.thresholds import RIVAL_GAIN
 from coupled.record.channels import LATERAL
 from coupled.record.record import Record
@@ -36,6 +36,7 @@ from coupled.rig.rigfile import read_rig
 from coupled.schema import changed
 from tests.support.airframes import flown, motion_of, noisy, pulses
 from tests.support.commands import coupled as command
+from tests.support.gaps import know_only
 from tests.support.models import edited_model
 from tests.support.rigs import bench
 
@@ -58,6 +59,18 @@ def searched(rig: Rig, record: Record, library: Sequence[Effect]) -> Choice:
     """Return the set of some effects that explains a record's surfaces and motion."""
     case = prepare(rig, {"r": motion_of(record)}, Part("column")).case
     return search_sets(replace(case, outputs_with_noise_of=None), library)[1]
+
+
+def test_an_unexplained_airframe_says_that_its_functions_were_not_tried(
+    cessna: Rig, worn: Record, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    know_only(monkeypatch, [BY_NAME["drag"]])
+    alone = cessna.changed({"controls": {}, "noise": {}})
+    found = diagnose(alone, {"r": motion_of(worn)})
+    assert found.verdict == "unexplained"
+    assert "the model's own aerodynamic functions (--terms)" in found.summary
+    assert untried_terms([term(CLP, "ROLL")], alone) == ""
+    assert untried_terms(EFFECTS, bench()) == ""
 
 
 def without(record: Record, name: str) -> Record:

@@ -287,6 +287,15 @@ def with_terms(library: Sequence[Effect], rig: Rig, records: Mapping[str, Record
     return [*kept, *(term(name, axis) for name, axis in axes.items() if name in large)]
 
 
+def untried_terms(library: Sequence[Effect], rig: Rig) -> str:
+    """Return a sentence on the model's functions, if it has some and a library lacks them."""
+    if rig.flight is None or any(effect.of for effect in library):
+        return ""
+    if not functions_of(main_file(rig.flight, [aircraft_folder()], rig.place)):
+        return ""
+    return f"Not tried: factors on the model's own aerodynamic functions ({TERMS_OPTION})."
+
+
 def large_terms(rig: Rig, record: Record, axes: Mapping[str, str]) -> set[str]:
     """Return the functions whose share of their axis in a record is at least `NEGLIGIBLE`."""
     assert rig.flight is not None
