@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
+from scipy.signal import lfilter
 
 import coupled
 from coupled.errors import InputError
@@ -22,6 +23,7 @@ from coupled.record.channels import ControlName
 from coupled.record.importing.plausible import drives_the_hand, held
 from coupled.record.record import Record
 from tests.support.gaps import made, nominal_rig
+from tests.support.records import NOISE
 from tests.support.rigs import bench
 
 TIME_s = np.arange(1200) / 100.0
@@ -233,3 +235,20 @@ def test_a_repeating_sensor_is_no_alternative_to_an_effect_that_explains_nothing
     found = findings(prepared, *search_sets(prepared.case, library))
     assert [effect.name for effect in found.effects] == ["bend"]
     assert found.verdict == "unexplained"
+
+
+def test_slow_noise_of_a_sensor_is_named_as_what_it_may_be(tmp_path: Path) -> None:
+    """It was a gap that follows nothing, with no word of what leaves such a residual."""
+    rig = nominal_rig(False)
+    record = made(tmp_path, rig, {}, 33)
+    data, at = record.data.copy(), record.channels.index("column_deflection_m")
+    kept = np.exp(-1.0 / (0.3 * rig.frame_rate))
+    slow = lfilter([1.0], [1.0, -kept], np.random.default_rng(3).standard_normal(len(data)))
+    data[:, at] += 1.2 * NOISE["column_deflection_m"] * slow / slow.std()
+    drifting = {"r": Record(record.channels, data, record.manifest)}
+    prepared = prepare(rig, drifting, Part("column"))
+    library = [effect for effect in prepared.library if effect.name == "bend"]
+    found = findings(prepared, *search_sets(prepared.case, library))
+    assert found.guilty == ("linkage",)
+    assert "no function of the stage's signals" in found.summary
+    assert "slow noise of its sensors looks so" in found.summary

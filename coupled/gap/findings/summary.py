@@ -18,7 +18,7 @@ from coupled.gap.findings.budget import Shrink, StageBudget
 from coupled.gap.findings.result import EffectResult, Findings, ParameterEstimate, StageResult
 from coupled.gap.findings.where import Remains, Where
 from coupled.gap.noise.lines import SeenLine
-from coupled.gap.thresholds import CERTAIN, MINOR
+from coupled.gap.thresholds import CERTAIN, DOUBLED, MINOR
 
 _SENTENCE = re.compile(r"(?<=\.) (?=[A-ZΑ-Ω])")
 OF_SIGNAL = {
@@ -299,7 +299,8 @@ def _remains(stage: str, left: Remains, effects: bool) -> str:
         said += f"{100 * most.share:.0f} % {follows} {_signal(most.signal)}, and "
     share = round(100 * left.free_share)
     if share < 100.0 * MINOR:
-        return f"{said}no function of the stage's signals predicts held-out stretches."
+        slow = "" if left.follows or left.gap > DOUBLED else "; slow noise of its sensors looks so"
+        return f"{said}no function of the stage's signals predicts held-out stretches{slow}."
     of = "the stage's own signals" if left.free_in == "all" else _signal(left.free_in)
     return f"{said}{share} % could be some function of {of}."
 
