@@ -60,6 +60,8 @@ _KEPT = 8  # size of the cache of residuals; threads fit different effects at on
 class HiddenGap:
     """A noise floor that may hide a gap: `share` is the floor over the channel's motion, both rms.
 
+    `most` is the largest share that hides no large gap. It is larger for the airframe, of which a
+    gentle flight has hardly ten floors of motion.
     `noisiest` is the channel whose noise dominates the floor, `channel` that of the output.
     `misses` is the gap of the healthy records, if the floor includes a model error; else 0.
     `coloured` is a gap that noise of the input may cause, if its colour is too uncertain; else 0.
@@ -70,11 +72,12 @@ class HiddenGap:
     channel: str
     misses: float = 0.0
     coloured: float = 0.0
+    most: float = SMALL
 
     @property
     def much(self) -> bool:
         """Whether the floor could hide a gap that is a large share of the signal."""
-        return self.share > SMALL
+        return self.share > self.most
 
     @property
     def still(self) -> bool:

@@ -57,7 +57,7 @@ from coupled.gap.stages.surfaces import (
     surface_points,
     trim_of,
 )
-from coupled.gap.thresholds import FAR, KNOWN, SHOT_TRIES
+from coupled.gap.thresholds import FAR, KNOWN, ROUGH, SHOT_TRIES
 from coupled.parallel import in_threads, in_turn
 from coupled.record.channels import LATERAL, ControlName, channel, motion_channels
 from coupled.record.record import Record
@@ -420,7 +420,8 @@ def _output(
     if name in SLOW:  # they drift far with the phugoid, while all that damps the rates is hidden
         return made
     noisiest = "the surfaces" if moved_by > own else name
-    return replace(made, hidden_gap=HiddenGap(floor / float(np.std(measured)), noisiest, name))
+    share = floor / float(np.std(measured))
+    return replace(made, hidden_gap=HiddenGap(share, noisiest, name, most=ROUGH))
 
 
 def unjudged_axes(outputs: Sequence[Output], records: Sequence[Record]) -> list[str]:
