@@ -203,6 +203,12 @@ def prepare(
         words for file, one in records.items() for words in not_measured(one, own, file, set_points)
     ]
     left_out = [stepped, *(why for one in live for why in one.left_out), *repeated]
+    left_out += [
+        f"{channel(control, 'modifying_force')} of {file} was computed from the δc in it, and does "
+        "not show the multiplier."
+        for file, reader in zip(records, readers, strict=True)
+        if part.own and reader.repeats_product
+    ]
     for file, record in records.items() if part.own else ():
         left_out += clipped(record, control, file)
     left_out += [] if rig.controls else unjudged_axes(outputs, each)

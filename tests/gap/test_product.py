@@ -7,10 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from coupled.gap.chain import Part
 from coupled.gap.diagnose import diagnose
+from coupled.gap.prepare import prepare
 from coupled.gap.signals.floors import remove_projection
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points
+from coupled.record.record import Record
 from tests.support.gaps import made, nominal_rig
 
 
@@ -41,6 +44,23 @@ def test_the_floor_of_a_digital_product_is_that_of_an_analog_one(tmp_path: Path)
     assert floors[1] == pytest.approx(floors[0], rel=0.1)
     assert gaps[0] == pytest.approx(1.0, abs=0.05)
     assert gaps[1] > 1.4
+
+
+@pytest.mark.parametrize(("own_N", "shown"), [(0.0, False), (0.05, True)])
+def test_a_force_computed_from_the_record_does_not_show_the_multiplier(
+    tmp_path: Path, own_N: float, shown: bool
+) -> None:
+    """A healthy bench with such a column was a digital multiplier and 13 % more damping."""
+    rig = nominal_rig(False)
+    record = made(tmp_path, rig, {}, 3)
+    product = Reader(rig, record, "column", surface_points)._product(record["column_computed_m"])
+    data, at = record.data.copy(), record.channels.index("column_modifying_force_N")
+    data[:, at] = product + own_N * np.random.default_rng(2).standard_normal(len(product))
+    computed = {"r.csv": Record(record.channels, data, record.manifest)}
+    prepared = prepare(rig, computed, Part("column"))
+    assert any(one.stage == "multiplier" for one in prepared.case.outputs) is shown
+    said = "column_modifying_force_N of r.csv was computed from the δc in it"
+    assert any(words.startswith(said) for words in prepared.left_out) is not shown
 
 
 @pytest.mark.slow

@@ -17,7 +17,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,6 +53,7 @@ from coupled.gap.stages.surfaces import asked_of, filed_trim, surface_channel, t
 from coupled.gap.thresholds import (
     FAR_SIGMAS,
     KNOWN,
+    MINOR,
     MOST,
     NEARLY_ALL,
     REPLAY_KNOWN,
@@ -322,30 +323,47 @@ class Reader(Reading):
         own = min(self.driving("force"), between_jumps(force), key=lambda one: one.rms)  # backlash
         return [self._made("loader", "force", predict, noisy, own, self.imposed)]
 
+    def _product(self, read: Floats, rig: Rig | None = None) -> Floats:
+        """Return F_mod by δc as read, by this rig or another one."""
+        rig = self.rig if rig is None else rig
+        missed, assumed = self.missed.under(rig, self.control), self.assumed()
+        more = None if assumed is None else assumed.gradient
+        read = read - self.neutral()
+        return replay_product(rig, self.control, read, self.feel(), missed, more)
+
+    @cached_property
+    def repeats_product(self) -> bool:
+        """Whether F_mod of an analog product is no reading: it has no noise but that of δc as read.
+
+        A recorder, or the host, has computed it. The loader's motion tells which product acted.
+        """
+        analog = self.rig.controls[self.control].loader.multiplier != "digital"
+        if not analog or self.moved or self.set_points or "multiplier" in self.missing():
+            return False
+        computed = self.as_read("computed")
+        product = self._product(computed)
+        repeated = _rms(product - self._product(smoothed(computed)))
+        return repeated > 0.0 and _rms(self.signal("modifying_force") - product) < MINOR * repeated
+
     def _multiplier(self) -> list[Output]:
         """Return F_mod, predicted by the product of δc itself, or of δc as read.
 
         A digital product contains the sensor noise and scale error of δc, an analog product does
         not. The part of F_mod that repeats the noise of δc (`correlated`) is therefore not the
         channel's own noise: included in the noise floor, it would hide whether the product is
-        digital.
+        digital. There is no output if that is all of its noise (`repeats_product`).
 
         At the breakout the product jumps. Frames in which noise of δc decides the sign of a jump
         are not judged: the prediction there is the measurement. A jump below the noise of F_mod
         counts too, if it exceeds the rise of the gradient: δc as read has the right sign more often
         than δc smoothed, for both kinds of product.
         """
+        if self.repeats_product:
+            return []
         recorded, computed = self.signal("modifying_force"), self.as_read("computed")
         own, level = self.channel_noise("modifying_force"), self.channel_noise("computed")
-        smooth, feel = smoothed(computed), self.feel()
-        neutral = 0.0 * smooth + self.neutral()
-
-        def product(read: Floats, rig: Rig = self.rig) -> Floats:
-            missed, assumed = self.missed.under(rig, self.control), self.assumed()
-            more = None if assumed is None else assumed.gradient
-            return replay_product(rig, self.control, read - neutral, feel, missed, more)
-
-        below, above, beyond = (product(neutral + k * level.rms) for k in (-1.0, 1.0, 3.0))
+        smooth, neutral = smoothed(computed), 0.0 * computed + self.neutral()
+        below, above, beyond = (self._product(neutral + k * level.rms) for k in (-1.0, 1.0, 3.0))
         jump, rise = np.abs(above - below), np.abs(beyond - above)
         near = np.abs(smooth - neutral) < FAR_SIGMAS * level.rms
         judged = ~(near & ((jump > FAR_SIGMAS * own.rms) | (jump > 2.0 * rise)))
@@ -361,12 +379,13 @@ class Reader(Reading):
                 sensed = self.sensed(rig)
                 still = seen - sensed.hum(computed)
                 read = sensed.curve.inverse(still / sensed.scale(len(seen)))
-            return np.where(judged, product(read, rig), recorded)
+            return np.where(judged, self._product(read, rig), recorded)
 
         def noisy(rig: Rig, k: int) -> Floats:
             return predict(rig, with_error(likely, k, level))
 
-        correlated = np.where(judged, product(computed) - product(smooth), 0.0)
+        correlated = self._product(computed) - self._product(smooth)
+        correlated = np.where(judged, correlated, 0.0)
         given = ("modifying_force", predict, noisy, own)
         return [self._made("multiplier", *given, judged=judged, correlated=correlated)]
 
