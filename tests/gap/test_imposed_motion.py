@@ -30,13 +30,13 @@ def test_a_damper_beside_its_own_numbers_has_no_gap() -> None:
     assert found.closed_loop is None  # nobody flies it by its force
 
 
-def heavy(rate_Hz: float, mass_kg: float = HEAVY_kg) -> tuple[Rig, Record]:
+def heavy(rate_Hz: float, mass_kg: float = HEAVY_kg, seconds: float = 40.0) -> tuple[Rig, Record]:
     """Return a bench of `HEAVY_kg` and its record, of a machine of another mass.
 
     Sines up to 2 Hz in few rows a second, to the last row: F = m·a + c·v + k·x, and white noise.
     """
     damping, stiffness = 80.0, 600.0
-    time = np.arange(round(40.0 * rate_Hz)) / rate_Hz
+    time = np.arange(round(seconds * rate_Hz)) / rate_Hz
     turns = 2.0 * np.pi * np.array([0.13, 0.41, 0.83, 1.31, 1.97])
     angle = np.outer(time, turns) + np.array([0.3, 2.1, 4.0, 5.2, 1.1])
     place, speed = 0.02 * np.sin(angle).sum(axis=1), 0.02 * np.cos(angle) @ turns
@@ -59,6 +59,34 @@ def heavy(rate_Hz: float, mass_kg: float = HEAVY_kg) -> tuple[Rig, Record]:
 def test_a_heavy_bench_whose_record_ends_in_motion_has_no_gap(rate_Hz: float) -> None:
     rig, record = heavy(rate_Hz)
     assert diagnose(rig, {"r": record}).verdict == "no_gap"
+
+
+@pytest.mark.parametrize("rate_Hz", [60.0, 250.0, 1000.0])
+def test_the_floor_of_a_heavy_bench_is_the_noise_of_its_gauge_at_any_rate(rate_Hz: float) -> None:
+    rig, record = heavy(rate_Hz, seconds=20.0)
+    [reader] = readers_of({"r": rig}, {"r": record}, "column")
+    [output] = reader.outputs()
+    assert output.gap(rig) == pytest.approx(1.0, abs=0.1)
+    assert output.floor < 0.025
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("rate_Hz", [60.0, 1000.0])
+def test_a_structure_that_bends_more_is_named_and_measured_at_any_rate(rate_Hz: float) -> None:
+    """The grip is moved, and the structure's bend is part of its motion."""
+    filed, real = 1e-4, 3e-4
+    rig, record = heavy(rate_Hz, seconds=20.0)
+    time, force, place = record.data.T
+    hiss = 2e-6 * np.random.default_rng(5).normal(size=len(time))
+    smooth = force - 0.02 * np.random.default_rng(4).normal(size=len(time))
+    names = (*record.channels, "column_deflection_m")
+    data = np.column_stack((time, force, place, place + real * smooth + hiss))
+    loader = {"bend_m_per_N": filed, "servo_frequency_Hz": 0.0}
+    rig = rig.changed({f"controls.column.loader.{key}": value for key, value in loader.items()})
+    found = diagnose(rig, {"r": Record(names, data)})
+    [effect] = found.effects
+    assert (found.verdict, effect.name) == ("effect", "bend")
+    assert effect.parameters[0].value == pytest.approx(real, rel=0.01)
 
 
 @pytest.mark.slow

@@ -11,10 +11,10 @@ scale of a frame, so the Whittaker smoother with n-th differences, n up to 3,
 
     H(ω) = 1/(1 + λ·(2·sin(ω/2))²ⁿ),
 
-removes the noise. λ and n are from generalised cross-validation (Craven and Wahba, 1979), which
-preserves sharp inputs. It assumes white noise, so the spectra are first divided by that of the
-noise's colour, and λ is scaled likewise. A line (`lines`), such as mains hum, is not noise: it is
-subtracted before and added again.
+removes the noise; of an imposed motion with n up to 6. λ and n are from generalised cross-
+validation (Craven and Wahba, 1979), which preserves sharp inputs. It assumes white noise, so the
+spectra are first divided by that of the noise's colour, and λ is scaled likewise. A line (`lines`),
+such as mains hum, is not noise: it is subtracted before and added again.
 
 The corners of a scripted force are also subtracted before and added again. A smoother rounds a
 corner or rings beside it, by several times the noise, and dry friction keeps the error of the peak.
@@ -26,7 +26,7 @@ residual of two straight lines that meet at a corner is noise alone.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -49,6 +49,8 @@ from coupled.gap.thresholds import (
     SMALL,
 )
 
+# Of an imposed motion. With n = 3 the acceleration of `wiener_error` is √6 times that of `passed`.
+MOTION_ORDERS = (6, 5, 4, 3, 2, 1)
 REST_FRAMES = PIECE // 2  # of a window at rest
 
 
@@ -244,7 +246,18 @@ class Smoother:
         may have corners if it is no motion of a mass.
         """
         whole = np.ascontiguousarray(signal, dtype=np.float64).tobytes()
-        return _known(whole, tuple(orders), noise, with_corners)
+        return _known(whole, tuple(orders), noise, with_corners, False)
+
+    @classmethod
+    def of_imposed(cls, signal: Floats, noise: Noise) -> Smoother:
+        """Return the best smoother of an imposed motion, whose ends are not judged.
+
+        Its second derivative counts, so that noise at frequencies where nothing moves must be
+        removed. The extension changes the curvature at the ends: included in the choice, the ends
+        would keep that noise at high frame rates.
+        """
+        whole = np.ascontiguousarray(signal, dtype=np.float64).tobytes()
+        return _known(whole, MOTION_ORDERS, noise, False, True)
 
     def smooth(self, signal: Floats) -> Floats:
         """Return the signal of the smoother without its noise, same shape, zero phase."""
@@ -258,12 +271,27 @@ class Smoother:
         out = drift + np.fft.irfft(np.fft.rfft(long - drift) * self.gain, len(long))
         return np.asarray(out[self.reach : self.reach + len(noise)])
 
+    @classmethod
+    def imposed(cls, signal: Floats, noise: Noise) -> tuple[Floats, Callable[[int], Floats]]:
+        """Return an imposed motion without its noise, and with a numbered sample of its error.
+
+        The error is that of the smoother of a motion with this noise, which a log that was filtered
+        no longer contains.
+        """
+        frames = len(signal)
+        smooth = cls.of_imposed(signal, noise).smooth(signal)
+        noisy = smooth + noise.sample(frames, np.random.default_rng(41))
+
+        def with_error(k: int) -> Floats:
+            known = cls.of_imposed(noisy, noise)
+            return smooth + known.wiener_error(noise, frames, np.random.default_rng([41, k]))
+
+        return smooth, with_error
+
     @property
     def memory(self) -> int:
         """The number of frames beyond which its impulse response is below `NEGLIGIBLE` in sum."""
-        size = np.abs(np.fft.irfft(self.gain))[: len(self.gain)]
-        beyond = np.cumsum(size[::-1])[::-1]
-        return int(np.argmax(beyond <= NEGLIGIBLE * beyond[0]))
+        return _memory_of(self.gain)
 
     def wiener_error(self, level: Noise, frames: int, rng: np.random.Generator) -> Floats:
         """Return a sample of the smoothing error, PSD H·Sₙ: noise passed and signal lost.
@@ -284,7 +312,11 @@ class Smoother:
 
 @lru_cache(maxsize=_REMEMBERED)
 def _known(
-    signal: bytes, orders: tuple[int, ...], noise: Noise | None, with_corners: bool
+    signal: bytes,
+    orders: tuple[int, ...],
+    noise: Noise | None,
+    with_corners: bool,
+    inside: bool,
 ) -> Smoother:
     """Return the smoother of a signal, cached."""
     plain = np.frombuffer(signal)
@@ -292,7 +324,7 @@ def _known(
     corners = corners_in(plain - lines) if with_corners else Corners()
     rest = plain - lines - corners.over(np.arange(len(plain), dtype=np.float64))
     reach = min(len(plain) - 1, 200)
-    gain = _gain(_lengthened(rest, reach), orders, _colour(rest, noise))
+    gain = _gain(_lengthened(rest, reach), orders, _colour(rest, noise), reach if inside else None)
     for array in (gain, lines):
         array.flags.writeable = False
     return Smoother(gain, reach, lines, corners)
@@ -310,26 +342,45 @@ def _colour(signal: Floats, noise: Noise | None) -> float:
     return noise.memory if noise is not None and clear else 0.0
 
 
-def _gain(long: Floats, orders: Sequence[int], memory: float) -> Floats:
+def _gain(long: Floats, orders: Sequence[int], memory: float, inside: int | None) -> Floats:
     """Return the gain with the least generalised cross-validation score for an extended signal.
 
-    The noise correlates from frame to frame by `memory`.
+    The noise correlates from frame to frame by `memory`. With an extension `inside` which the
+    signal begins, only the frames count that are judged under an imposed motion.
     """
     rate = 2.0 * np.sin(np.pi * np.fft.rfftfreq(len(long)))
     colour = (1.0 + memory) ** 2 / ((1.0 - memory) ** 2 + memory * rate**2)  # 1 at Nyquist
-    power = np.abs(np.fft.rfft(long - np.linspace(long[0], long[-1], len(long)))) ** 2 / colour
+    whole = np.fft.rfft(long - np.linspace(long[0], long[-1], len(long)))
+    power = np.abs(whole) ** 2 / colour
     best, found, stopped = np.inf, (orders[0], 0.0), np.empty_like(power)
     for order in orders:
-        steep = rate ** (2 * order) * colour
-        for strength in np.logspace(-3, 12, 61).tolist():
+        steep, span = rate ** (2 * order) * colour, max(order, 3)
+        for strength in np.logspace(-span, 4 * span, 61).tolist():
             np.multiply(steep, strength, out=stopped)
             stopped /= 1.0 + stopped  # 1 − H
             share = float(stopped.sum())
-            score = float(np.square(stopped, out=stopped) @ power) / share**2
+            if inside is None:
+                score = float(np.square(stopped, out=stopped) @ power) / share**2
+            else:
+                left = np.fft.irfft(stopped * whole / np.sqrt(colour), len(long))[inside:-inside]
+                ends = unjudged(1.0 - stopped, len(left))
+                score = float(np.mean(left[ends : len(left) - ends] ** 2)) / share**2
             if score < best:
                 best, found = score, (order, strength)
     order, strength = found
     return np.asarray(1.0 / (1.0 + strength * rate ** (2 * order) * colour))
+
+
+def unjudged(gain: Floats, frames: int) -> int:
+    """Return at how many frames at either end a smoother bends a motion that goes on there."""
+    return min(_memory_of(gain), int(SMALL * frames))
+
+
+def _memory_of(gain: Floats) -> int:
+    """Return the number of frames beyond which an impulse response is below `NEGLIGIBLE` in sum."""
+    size = np.abs(np.fft.irfft(gain))[: len(gain)]
+    beyond = np.cumsum(size[::-1])[::-1]
+    return int(np.argmax(beyond <= NEGLIGIBLE * beyond[0]))
 
 
 def smoothed(signal: Floats, noise: Noise | None = None) -> Floats:

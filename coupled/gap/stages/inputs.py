@@ -44,11 +44,11 @@ from numpy.typing import NDArray
 
 from coupled.gap.effects.settings import CONTACT, is_dry, most_yielding
 from coupled.gap.noise.noise import Noise
-from coupled.gap.noise.smooth import Smoother, rate_of, smoothed
-from coupled.gap.signals.floors import Drive, with_error
+from coupled.gap.noise.smooth import Smoother, rate_of, smoothed, unjudged
+from coupled.gap.signals.floors import Drive
 from coupled.gap.signals.output import Floats, Predict
 from coupled.gap.signals.reading import Reading
-from coupled.gap.thresholds import CREEP_FRICTION_N, CREEP_WORSE, LESSER, SIGMAS, SMALL, TRIES
+from coupled.gap.thresholds import CREEP_FRICTION_N, CREEP_WORSE, LESSER, SIGMAS, TRIES
 from coupled.parallel import in_threads
 from coupled.record.channels import ControlName, unit_of
 from coupled.rig.hosted import Hosted
@@ -117,19 +117,21 @@ def _without_creep(rig: Rig, at: Driven, measured: Floats, times: float = 1.0) -
     return plain + min(max((much - worse) / (much - some), 0.0), 1.0) * push
 
 
-def under_motion(reading: Reading) -> tuple[Predict, Noisy]:
+def under_motion(reading: Reading) -> tuple[Predict, Noisy, NDArray[np.bool_]]:
     """Return the prediction of the force as read, N, under an imposed motion.
 
-    And that with a numbered sample of the error of the smoothed motion. A smoother bends a motion
-    that does not rest at an end of the record: within its memory of both, where the inertia would
-    be wrong, the prediction is the measurement.
+    And that with a numbered sample of the error of the smoothed motion, and the judged frames. A
+    smoother bends a motion that does not rest at an end of the record: within its memory of both,
+    where the inertia would be wrong, the prediction is the measurement.
     """
     control, inputs, others = reading.control, reading.other_inputs(), reading.others()
-    feel, force, measured = reading.feel(), reading.pulled(), reading.signal("force")
+    feel, measured, held = reading.feel(), reading.signal("force"), reading.pulled().smooth
     given, level = reading.signal(reading.imposed), reading.driving(reading.imposed)
-    smoother = Smoother.of(given)
-    motion, frames = smoother.smooth(given), np.arange(len(given))
-    spoiled = min(smoother.memory + NEIGHBOURS, int(SMALL * len(given)))
+    motion, moved = Smoother.imposed(given, level)
+    # The force bends the structure, by which the loader moves: its noise accelerates the loader.
+    force, pulled_by = Smoother.imposed(measured, reading.driving("force"))
+    spoiled = unjudged(Smoother.of_imposed(given, level).gain, len(given)) + NEIGHBOURS
+    frames = np.arange(len(given))
     ends = np.minimum(frames, frames[::-1]) < spoiled
 
     def moved_by(motion: Floats, pulled: Floats) -> Predict:
@@ -158,15 +160,15 @@ def under_motion(reading: Reading) -> tuple[Predict, Noisy]:
 
             made = np.where(ends, measured, read(answer.force))
             if (answer.most > answer.least).any():
-                made = _within_rests(made, force.smooth, read(answer.least), read(answer.most))
+                made = _within_rests(made, held, read(answer.least), read(answer.most))
             return _within_jumps(made, measured, answer.jumps) if answer.jumps.any() else made
 
         return predicted
 
     def noisy(rig: Rig, k: int) -> Floats:
-        return moved_by(with_error(motion, k, level), force.with_error(k + TRIES))(rig)
+        return moved_by(moved(k), pulled_by(k + TRIES))(rig)
 
-    return moved_by(motion, force.smooth), noisy
+    return moved_by(motion, force), noisy, ~ends
 
 
 def _within_rests(predicted: Floats, measured: Floats, least: Floats, most: Floats) -> Floats:

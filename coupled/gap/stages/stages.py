@@ -319,9 +319,10 @@ class Reader(Reading):
 
     def _answering(self) -> list[Output]:
         """Return the force as the output under an imposed motion."""
-        force, (predict, noisy) = self.signal("force"), under_motion(self)
+        force, (predict, noisy, judged) = self.signal("force"), under_motion(self)
         own = min(self.driving("force"), between_jumps(force), key=lambda one: one.rms)  # backlash
-        return [self._made("loader", "force", predict, noisy, own, self.imposed)]
+        given = ("loader", "force", predict, noisy, own, self.imposed)
+        return [self._made(*given, judged=judged)]
 
     def _product(self, read: Floats, rig: Rig | None = None) -> Floats:
         """Return F_mod by δc as read, by this rig or another one."""
