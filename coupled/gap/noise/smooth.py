@@ -288,11 +288,6 @@ class Smoother:
 
         return smooth, with_error
 
-    @property
-    def memory(self) -> int:
-        """The number of frames beyond which its impulse response is below `NEGLIGIBLE` in sum."""
-        return _memory_of(self.gain)
-
     def wiener_error(self, level: Noise, frames: int, rng: np.random.Generator) -> Floats:
         """Return a sample of the smoothing error, PSD H·Sₙ: noise passed and signal lost.
 
