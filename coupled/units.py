@@ -113,22 +113,27 @@ _QUOTIENTS: Final = (
 )
 _FACTOR: Final = re.compile(r"([A-Za-z]+|1|%)(?:\^?([23]))?")
 
-_TIMES: Final = re.compile(r"(?<=[A-Za-z])[·⋅*.](?=[A-Za-z])")
+_TIMES: Final = re.compile(r"(?<=[A-Za-z])(?: *[·⋅*.-] *| +)(?=[A-Za-z])")
 
 
 def parse_unit(text: str) -> Unit | None:
-    """Return the unit that a text like `lbf/in`, `[deg/s]`, `N·m` or `m/s²` means, or nothing."""
+    """Return the unit that a text like `lbf/in`, `[deg/s]`, `ft-lb` or `m/s²` means, or nothing.
+
+    A product is read factor by factor: `m·N` is a torque, and not the millinewton `mN`. It stands
+    before a `/` only, since `N/mm·s` has two meanings.
+    """
     plain = text.strip().strip("[]()").strip()
-    plain = plain.replace("°", "deg").replace("²", "^2").replace("µ", "u").replace(" ", "")
-    plain = _TIMES.sub("", plain)
+    plain = plain.replace("°", "deg").replace("²", "^2").replace("µ", "u")
     if len(plain) > 40:
         return None
+    above, *below = plain.split("/")
+    factors = [(part, 1) for part in _TIMES.split(above)] + [(part, -1) for part in below]
     factor, dimension = 1.0, _NONE
-    for place, part in enumerate(plain.split("/")):
-        match = _FACTOR.fullmatch(part)
-        if match is None or match[1] not in _NAMED:
+    for part, sign in factors:
+        match = _FACTOR.fullmatch(part.replace(" ", ""))
+        if match is None or _TIMES.search(part) or match[1] not in _NAMED:
             return None
-        power = int(match[2] or 1) * (1 if place == 0 else -1)
+        power = int(match[2] or 1) * sign
         named = _NAMED[match[1]]
         factor *= named.factor**power
         a, b, c, d = (x + power * y for x, y in zip(dimension, named.dimension, strict=True))

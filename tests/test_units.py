@@ -33,3 +33,23 @@ def test_the_factors_of_the_edges_are_those_of_the_units() -> None:
     assert constants.lbf / constants.inch == units.POUND_PER_INCH_N_per_m
     assert constants.inch / constants.lbf == units.INCH_PER_POUND_m_per_N
     assert math.pi / 180.0 == units.DEGREE_rad
+
+
+@pytest.mark.parametrize("name", ["m·N", "m*N", "m N", "N-m", "N*m", "Nm"])
+def test_a_product_is_its_factors_in_any_order(name: str) -> None:
+    unit = units.parse_unit(name)
+    assert unit is not None
+    assert (unit.factor, unit.word) == (1.0, "a torque")
+
+
+@pytest.mark.parametrize("name", ["ft-lb", "lb-ft", "lbf*ft", "ft lbf", "ftlbf"])
+def test_a_pound_foot_is_read_as_people_write_it(name: str) -> None:
+    unit = units.parse_unit(name)
+    assert unit is not None
+    assert unit.factor == pytest.approx(constants.lbf * constants.foot, rel=1e-15)
+    assert unit.word == "a torque"
+
+
+@pytest.mark.parametrize("name", ["N/mm·s", "N/mm s", "m-", "-m", "m**N", "N*"])
+def test_an_unclear_product_is_no_unit(name: str) -> None:
+    assert units.parse_unit(name) is None
