@@ -327,3 +327,27 @@ def test_a_measured_force_comes_before_a_commanded_one_and_a_switch(
     pl.DataFrame(table).write_csv(tmp_path / "log.csv")
     proposal, _ = proposed(tmp_path / "log.csv")
     assert proposal.mapped["column_force_N"] == "Kraft Istwert [N]"
+
+
+@pytest.mark.parametrize(
+    ("below", "dropped"),
+    [
+        ([";Motor;Encoder", "[s];[N];[m]"], ["2-3"]),
+        (["a;b;c", "d;e;f", "[s];[N];[m]"], ["2-4"]),
+        (["s;N;m", ";Motor;Encoder"], ["3"]),
+    ],
+)
+def test_further_rows_of_the_header_are_left_out(
+    tmp_path: Path, below: list[str], dropped: list[str]
+) -> None:
+    numbers = np.column_stack([TIME_s, FORCE_N, DEFLECTION_m])
+    rows = [";".join(f"{cell:.9f}" for cell in row).replace(".", ",") for row in numbers]
+    text = "\n".join(["t;column force [N];column encoder [m]", *below, *rows, ""])
+    (tmp_path / "log.csv").write_text(text)
+    proposal, table = proposed(tmp_path / "log.csv")
+    assert proposal.questions == ()
+    assert table["clock"]["drop_rows"] == dropped
+    assert "missing" not in table["log"]
+    (tmp_path / "map.toml").write_text(proposal.text)
+    record, _ = import_log(tmp_path / "log.csv", tmp_path / "map.toml")
+    np.testing.assert_allclose(record["column_force_N"], FORCE_N, atol=1e-6)

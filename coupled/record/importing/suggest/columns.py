@@ -31,7 +31,8 @@ class Column:
 
     `values` are its numbers, NaN if empty, shape (rows,); for a column of lists, their first
     elements, and `length` is the number of elements. Dates are in s from the first, in the pattern
-    `date`, which is "?" if it is unknown. The rows `footer`, below the last time, are left out.
+    `date`, which is "?" if it is unknown. The rows `untimed`, above the first and below the last
+    time, are left out.
     """
 
     log: str
@@ -41,7 +42,7 @@ class Column:
     values: Floats
     length: int = 0
     date: str = ""
-    footer: str = ""
+    untimed: tuple[str, ...] = ()
 
     @property
     def moves(self) -> bool:
@@ -66,15 +67,22 @@ def columns_of(log: Log) -> list[Column]:
     clock = next((c for c in columns if c.is_clock and c.moves), None)
     if clock is None:
         return columns
-    rows, last = clock.values.size, int(np.flatnonzero(np.isfinite(clock.values))[-1])
-    if not rows - FEW * rows <= last + 1 < rows:
+    rows, timed = clock.values.size, np.flatnonzero(np.isfinite(clock.values))
+    first, last = int(timed[0]), int(timed[-1])
+    if first + rows - 1 - last > FEW * rows:
         return columns
-    lines = dict.fromkeys(str(log.line(row)) for row in (last + 1, rows - 1))
-    footer = "-".join(lines)
+    untimed = (*_lines(log, 0, first), *_lines(log, last + 1, rows))
     return [
-        replace(c, values=c.values[: last + 1], footer=footer) if c.values.size == rows else c
+        replace(c, values=c.values[: last + 1], untimed=untimed) if c.values.size == rows else c
         for c in columns
     ]
+
+
+def _lines(log: Log, first: int, end: int) -> list[str]:
+    """Return the rows of a log from `first` to before `end`, as `drop_rows` names them."""
+    if first == end:
+        return []
+    return ["-".join(dict.fromkeys(str(log.line(row)) for row in (first, end - 1)))]
 
 
 def _column(log: Log, name: str) -> Column:
@@ -83,8 +91,8 @@ def _column(log: Log, name: str) -> Column:
     own = next((plain for plain, each in log.doubled.items() if name in each), name)
     reading = read_name(own, unit, log.file.stem)
     if cells.dtype == pl.String:
-        first = cells.drop_nulls().head(1)
-        text = str(first[0]) if first.len() else ""
+        there = cells.drop_nulls()  # in the middle: the first may be a further row of the header
+        text = str(there[there.len() // 2]) if there.len() else ""
         if text[:1] in "[({" and text:
             return _lists(log, name, reading, cells)
         stamped = reading.channel == "time" and reading.sure and not is_number(text)

@@ -7,6 +7,7 @@ import re
 from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from collections import Counter
 from collections.abc import Sequence
+from itertools import chain
 from pathlib import Path
 from typing import Literal
 
@@ -46,8 +47,10 @@ def guess_layout(path: Path) -> Layout:
     skipped = rows[first][0] if not comment else _skipped(rows[first][0], lines, comment)
     cells = cells[first:]
     header = not all(is_number(cell) or not cell or _STAMP.match(cell) for cell in cells[0])
-    units_row = header and _holds_units(cells[1]) and any(map(is_number, cells[2]))
+    units_row = header and _holds_units(cells[1]) and any(map(is_number, chain(*cells[2:5])))
     below = cells[(2 if units_row else 1) if header else 0 :]
+    numbers = (i for i, row in enumerate(below) if any(map(is_number, row)))
+    below = below[next(numbers, 0) :]  # without further rows of the header
     found = {cell for row in below for cell in row if is_number(cell)}
     commas = {cell for cell in found if _COMMA.fullmatch(cell)}
     if delimiter == ",":  # of quoted cells, which may have commas between thousands

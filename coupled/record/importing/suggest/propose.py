@@ -205,8 +205,8 @@ def _clock(columns: Sequence[Column], log: str, several: bool, main: bool) -> li
         fit = sizes.time_units(column.values)
         step = float(np.median(sizes.forward_steps(column.values)))
         lines.append(("unit", *_one_of(fit, f"steps of {step:.6g}")))
-    if column.footer:
-        lines.append(("drop_rows", [column.footer], "without a time: a summary?"))
+    if column.untimed:
+        lines.append(("drop_rows", list(column.untimed), "without a time: a header, a summary?"))
     return lines + (_rate(column.values, fit[0]) if len(fit) == 1 and main else [])
 
 
