@@ -84,7 +84,8 @@ def _job(folder: Path, out: Path, name: str, rig: object, control: ControlName |
     rigs = (at / "rigs" / f"{rig}.toml" for at in (folder, folder.parent))
     rig_file = next((place for place in rigs if place.is_file()), shipped.get(rig))
     if rig_file is None:
-        raise InputError(folder / LIST, name, f"there is no rig {rig!r}; {nearest(rig, shipped)}")
+        problem = f"there is no rigs/{rig}.toml here or a folder up, and no shipped rig {rig!r}"
+        raise InputError(folder / LIST, name, f"{problem}; {nearest(rig, shipped)}")
     return Job(name, record, rig_file, file, control)
 
 

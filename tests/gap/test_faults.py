@@ -153,6 +153,13 @@ def test_a_record_that_cannot_be_read_is_refused_beside_the_others(
     assert seen == [("a", 1, 2), ("b", 2, 2)]
 
 
+def test_a_missing_rig_is_refused_with_the_places_of_rigs(tmp_path: Path, clean: Record) -> None:
+    folder_of(tmp_path, clean, "a")
+    (tmp_path / "records.toml").write_text('a = "yours.toml"\n')
+    with pytest.raises(InputError, match=r"no rigs/yours\.toml\.toml here or a folder up"):
+        jobs(tmp_path, tmp_path / "out")
+
+
 def test_workers_of_another_version_are_refused(
     tmp_path: Path, clean: Record, monkeypatch: pytest.MonkeyPatch
 ) -> None:
