@@ -100,9 +100,13 @@ def _one_element(value: object) -> object:
 
 
 class OtherClock(Stamped):
-    """The clock of a further log, if its stamps differ from the first log's."""
+    """The clock of a further log, if its stamps differ from the first log's.
+
+    `shift` is added to its times: by so much the first log's clock is ahead.
+    """
 
     source: str = named("from", min_length=1)
+    shift: float = quantity("s", 0.0)
 
 
 class Channel(Section):

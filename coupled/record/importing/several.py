@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -152,7 +153,9 @@ def lay_grids(
     if span_s[0] >= span_s[1]:
         begin = next(name for name in logs if first_s[name] == span_s[0])
         end = next(name for name in logs if last_s[name] == span_s[1])
-        problem = f"begins {span_s[0] - span_s[1]:.6g} s after {end} ends: one clock for both?"
+        problem = f"begins {span_s[0] - span_s[1]:.6g} s after {end} ends: one clock for both? If"
+        other = end if begin == main else begin
+        problem += f' not, clocks."{other}".shift_s adds their difference to the times of {other}'
         raise InputError(logs[begin].file, clock_of(logs[begin], log_map).source, problem)
     # A row at the end, but for its stamp's rounding, is included.
     slack_s = EVEN_frames * float(np.median(np.diff(stamps[main].from_first_s)))
@@ -176,4 +179,7 @@ def lay_grids(
 
 
 def _stamps(log: Log, log_map: LogMap, map_file: Path) -> Stamps:
-    return stamps_of(log, clock_of(log, log_map), (), map_file, _key(log, log_map))
+    clock = clock_of(log, log_map)
+    found = stamps_of(log, clock, (), map_file, _key(log, log_map))
+    shift_s = clock.shift if isinstance(clock, OtherClock) else 0.0
+    return replace(found, first_s=found.first_s + Fraction(shift_s))

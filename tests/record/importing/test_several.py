@@ -104,6 +104,18 @@ def test_logs_that_do_not_meet_are_refused(tmp_path: Path) -> None:
         import_log(files, tmp_path / "map.toml")
 
 
+@pytest.mark.parametrize("late_s", [1000.0, -1_767_225_600.0])
+def test_the_difference_of_two_clocks_is_added(tmp_path: Path, late_s: float) -> None:
+    files = two_logs(tmp_path, late_us=1e6 * late_s)
+    with pytest.raises(InputError, match=r'clocks\."state\.csv"\.shift_s adds'):
+        import_log(files, tmp_path / "map.toml")
+    state = '[clocks."state.csv"]\nfrom = "stamp"\nunit = "us"'
+    (tmp_path / "map.toml").write_text(f"{state}\nshift_s = {-late_s}\n{TWO}")
+    record, _ = import_log(files, tmp_path / "map.toml")
+    expected = 0.03 * np.sin(2 * (record.time_s + record_start(record)))
+    assert np.max(np.abs(record["column_computed_m"] - expected)) < 3e-6
+
+
 def test_a_further_logs_clock_may_be_another(tmp_path: Path) -> None:
     files = two_logs(tmp_path)
     state = files[1].read_text().splitlines()
