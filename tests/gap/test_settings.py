@@ -38,6 +38,18 @@ def test_a_tolerance_of_a_value_that_no_effect_has_alone_is_used() -> None:
     assert "loader.servo_damping_ratio" not in settings(bench(servo), "column")
 
 
+def test_a_tolerance_of_a_filed_contact_is_used() -> None:
+    key = "loader.friction_stiffness_N_per_m"
+    given = {"controls.column.tolerance": {key: 2e4}}
+    filed = bench({"friction_N": 2.0, "friction_stiffness_N_per_m": 1e5}).changed(given)
+    names = {p.key for one in settings(filed, "column").values() for p in one.free}
+    assert "loader.friction_stiffness_N_per_{d}" in names
+    # A contact that is not filed is a nuisance parameter already.
+    open_ = bench({"friction_N": 2.0}).changed(given)
+    names = {p.key for one in settings(open_, "column").values() for p in one.free}
+    assert "loader.friction_stiffness_N_per_{d}" not in names
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(("half", "within"), [(0.2, True), (0.02, False)])
 def test_a_servos_damping_within_its_tolerance_is_no_gap(

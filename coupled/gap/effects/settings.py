@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -50,7 +50,7 @@ def settings(rig: Rig, control: ControlName, outputs: Sequence[Output] = ()) -> 
         return {MOTION: setting_of(BY_NAME[MOTION], -half_s, half_s, 0.0)}
     given, found = rig.controls[control].tolerance, dict[str, Effect]()
     in_series = any(output.in_series for output in outputs)
-    for effect in (*EFFECTS, *_only_beside_others(given, control)):
+    for effect in (*EFFECTS, *_only_beside_others(rig, control)):
         ends = _ends(effect, rig, control)
         if ends is None:
             continue
@@ -62,11 +62,13 @@ def settings(rig: Rig, control: ControlName, outputs: Sequence[Output] = ()) -> 
     return found
 
 
-def _only_beside_others(given: Collection[str], control: ControlName) -> list[Effect]:
+def _only_beside_others(rig: Rig, control: ControlName) -> list[Effect]:
     """Return the parameters with a tolerance in the rig file that no effect has alone.
 
     Each is an effect by the name of its key, as the damping ratio of `servo_tuning`.
     """
+    given = rig.controls[control].tolerance
+    free = {p.key for one in contact(rig, control) for p in one.free}
     alone = {
         effect.free[0].key for effect in EFFECTS if len(effect.parameters) == 1 and effect.free
     }
@@ -74,7 +76,7 @@ def _only_beside_others(given: Collection[str], control: ControlName) -> list[Ef
         p.key: replace(effect, name=p.key, parameters=(p,))
         for effect in EFFECTS
         for p in effect.free
-        if p.key not in alone and p.key not in CONTACT and p.key_on(control) in given
+        if p.key not in {*alone, *free} and p.key_on(control) in given
     }
     return list(found.values())
 
