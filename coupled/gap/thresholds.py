@@ -132,7 +132,7 @@ DIFFERENCE = 0.3  # step: noise floors by which a difference changes the residua
 DIFFERENCE_STEPS = (1e-4, 0.1)  # step: bounds of a difference's step, of its scale; ablated
 DAMPING_FIRST, DAMPING_FACTOR = 0.01, 10.0  # step: Marquardt 1963
 FEWER = 5.0  # step: most correlation times by which samples of dry friction are fewer; ablated
-SLOPES_KEPT = 1_000_000  # step: elements of a Jacobian, 8 MB, that is kept for another fit
+SLOPES_KEPT = 250_000  # step: elements of a Jacobian, 2 MB, kept with every fit; 8 MB with a set's
 
 # A servo as fitted (`nominal`). Its phase margin in degrees is about 100 times its damping ratio
 # (Franklin, Powell and Emami-Naeini, Feedback Control of Dynamic Systems, ch. 6): below 0.1 it has

@@ -63,7 +63,7 @@ class Slope:
 
     def kept(self) -> Slope | None:
         """Return the Jacobian, to start another fit with; None if it is too large to keep."""
-        return self if self.jacobian.size <= SLOPES_KEPT else None
+        return self if self.jacobian.size <= 4 * SLOPES_KEPT else None
 
 
 class Slopes:

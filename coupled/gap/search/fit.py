@@ -39,7 +39,7 @@ from coupled.gap.search.descent import WHOLE, Descent, End, Slope
 from coupled.gap.search.found import Fit, Group
 from coupled.gap.search.intervals import cost_of_unit_likelihood, half_width, least_of, open_above
 from coupled.gap.signals.output import TRIM, Output, Part
-from coupled.gap.thresholds import DOUBLED, FAR, ROUNDS, TINY, TRIM_SIGMAS
+from coupled.gap.thresholds import DOUBLED, FAR, ROUNDS, SLOPES_KEPT, TINY, TRIM_SIGMAS
 from coupled.parallel import go_on
 from coupled.record.channels import ControlName
 from coupled.rig.rig import Rig
@@ -123,7 +123,7 @@ def _remembered(
 ) -> Group:
     """Return a fit from the cache; a fit that starts at the optimum of another one is that fit.
 
-    Its Jacobians are large, and not kept; that of a fit that ended here is in `descent`.
+    It has no large Jacobians; that of a fit that ended here is in `descent`.
     """
     ours, known = touched(case.outputs, members), descent.known
     if descent.most < WHOLE.most and parent is not None:
@@ -135,11 +135,12 @@ def _remembered(
     key = (*what, tuple(map(tuple, _starts(members, start))))
     if key not in known:
         found = _fit(case, ours, members, priors, start, descent, part)
-        small = replace(found, slope=None)
-        known[key] = known[*what, (tuple(found.values.values()),)] = small
+        large = found.slope is not None and found.slope.jacobian.size > SLOPES_KEPT
+        kept = replace(found, slope=None) if large else found
+        known[key] = known[*what, (tuple(found.values.values()),)] = kept
         return found
     held: Group = known[key]
-    return replace(held, slope=descent.slopes.get(tuple(held.values)))
+    return replace(held, slope=held.slope or descent.slopes.get(tuple(held.values)))
 
 
 def _held(case: Case, ours: Sequence[Output], keys: Sequence[str], parent: Fit) -> Floats | None:

@@ -7,10 +7,14 @@ and other objects refused. Nothing in a file is executed.
 from __future__ import annotations
 
 import io
+import warnings
+from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.exceptions import ComplexWarning
 from scipy import io as scipy_io
 from scipy.io.matlab import MatlabOpaque, varmats_from_mat
 from scipy.sparse import issparse
@@ -67,8 +71,7 @@ def _load(path: Path, content: bytes) -> dict[str, Any]:
         return _load_together(path, content)
     found: dict[str, Any] = {}
     for name, variable in varmats_from_mat(io.BytesIO(content)):
-        loaded = scipy_io.loadmat(variable, mat_dtype=True, verify_compressed_data_integrity=True)
-        value = loaded.get(name or "None")
+        value = _read(variable.getvalue()).get(name or "None")
         own = _field(value, "s0") or name if isinstance(value, MatlabOpaque) else name
         if not own or own.startswith("__"):
             continue
@@ -91,13 +94,22 @@ def _load_together(path: Path, content: bytes) -> dict[str, Any]:
     if doubled:
         raise InputError(path, doubled[0], "duplicate variable")
     wanted = [name for name in listed if not name.startswith("__")]
-    loaded = scipy_io.loadmat(
-        io.BytesIO(content),
-        mat_dtype=True,  # else scipy reads logicals as counts
-        variable_names=wanted,
-        verify_compressed_data_integrity=True,
-    )
+    loaded = _read(content, wanted)
     return {name: value for name, value in loaded.items() if not name.startswith("__")}
+
+
+def _read(content: bytes, wanted: Sequence[str] | None = None) -> dict[str, Any]:
+    """Return variables in the types of MATLAB; in those of storage scipy reads logicals as counts.
+
+    Of complex numbers it would drop the imaginary parts: then they are read as stored.
+    """
+    read = partial(scipy_io.loadmat, variable_names=wanted, verify_compressed_data_integrity=True)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", ComplexWarning)
+        try:
+            return dict(read(io.BytesIO(content), mat_dtype=True))
+        except ComplexWarning:
+            return dict(read(io.BytesIO(content)))
 
 
 def _field(value: MatlabOpaque, *fields: str) -> str:
