@@ -33,7 +33,7 @@ from coupled.schema import load_toml
 
 LIST = "records.toml"
 ENDS = (".csv", ".parquet")  # of records' files
-HEAD = ("record", "rig", "verdict", "effects", "parameters", "guilty", "rivals", "closed")
+HEAD = ("record", "rig", "verdict", "effects", "parameters", "guilty", "rivals", "closed", "why")
 Progress = Callable[[str, int, int], None]
 _AHEAD = 4  # records that wait for each worker
 
@@ -136,7 +136,7 @@ def summary(rows: Sequence[Row]) -> str:
         rivals = " ".join("|".join(group) for group in row.rivals)
         closed = "" if row.closed is None else f"{row.closed:.4f}"
         cells = (row.record, row.rig, row.verdict, " ".join(row.effects), parameters)
-        table.writerow((*cells, " ".join(row.guilty), rivals, closed))
+        table.writerow((*cells, " ".join(row.guilty), rivals, closed, row.why))
     return text.getvalue()
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import shutil
 from pathlib import Path
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 
 from coupled.flight.gusts import dryden
+from coupled.gap.batch import Row, summary
 from coupled.gap.diagnose import diagnose
 from coupled.gap.effects.library import BY_NAME
 from coupled.gap.findings.diagnosis import Diagnosis
@@ -140,6 +142,13 @@ def test_the_summary_names_size_certainty_and_share(tmp_path: Path) -> None:
     assert "Coulomb friction, 0 → 2.0" in said
     assert f"Probability {STATED_MOST:.2f}." in said
     assert "% of the gap on held-out data" in said
+
+
+def test_the_table_of_a_folder_says_why_a_record_was_refused() -> None:
+    why = "column_force_N: row 7 holds 'x', no number"
+    row = Row("a", "mine", "refused", (), (), (), (), None, why)
+    (told,) = csv.DictReader(summary([row]).splitlines())
+    assert (told["verdict"], told["why"]) == ("refused", why)
 
 
 @pytest.mark.slow
