@@ -104,8 +104,7 @@ def _read(content: bytes, wanted: Sequence[str] | None = None) -> dict[str, Any]
     Of complex numbers it would drop the imaginary parts: then they are read as stored.
     """
     read = partial(scipy_io.loadmat, variable_names=wanted, verify_compressed_data_integrity=True)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error", ComplexWarning)
+    with warnings.catch_warnings(action="error", category=ComplexWarning):
         try:
             return dict(read(io.BytesIO(content), mat_dtype=True))
         except ComplexWarning:
