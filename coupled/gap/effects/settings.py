@@ -50,7 +50,7 @@ def settings(rig: Rig, control: ControlName, outputs: Sequence[Output] = ()) -> 
         return {MOTION: setting_of(BY_NAME[MOTION], -half_s, half_s, 0.0)}
     given, found = rig.controls[control].tolerance, dict[str, Effect]()
     in_series = any(output.in_series for output in outputs)
-    for effect in (*EFFECTS, *_only_beside_others(rig, control)):
+    for effect in EFFECTS:
         ends = _ends(effect, rig, control)
         if ends is None:
             continue
@@ -60,25 +60,6 @@ def settings(rig: Rig, control: ControlName, outputs: Sequence[Output] = ()) -> 
         both = in_series and effect.stage == "linkage"
         found[effect.name] = replace(setting, outputs=("linkage", "loader")) if both else setting
     return found
-
-
-def _only_beside_others(rig: Rig, control: ControlName) -> list[Effect]:
-    """Return the parameters with a tolerance in the rig file that no effect has alone.
-
-    Each is an effect by the name of its key, as the damping ratio of `servo_tuning`.
-    """
-    given = rig.controls[control].tolerance
-    free = {p.key for one in contact(rig, control) for p in one.free}
-    alone = {
-        effect.free[0].key for effect in EFFECTS if len(effect.parameters) == 1 and effect.free
-    }
-    found = {
-        p.key: replace(effect, name=p.key, parameters=(p,))
-        for effect in EFFECTS
-        for p in effect.free
-        if p.key not in {*alone, *free} and p.key_on(control) in given
-    }
-    return list(found.values())
 
 
 def lag_within_a_step(rig: Rig) -> Effect:
