@@ -204,8 +204,8 @@ def prepare(
     ]
     left_out = [stepped, *(why for one in live for why in one.left_out), *repeated]
     left_out += [
-        f"{channel(control, 'modifying_force')} of {file} was computed from the δc in it, and does "
-        "not show the multiplier."
+        f"{channel(control, 'modifying_force')} of {file} was computed from the recorded "
+        f"{channel(control, 'computed')}: it does not show which multiplier acts."
         for file, reader in zip(records, readers, strict=True)
         if part.own and reader.repeats_product
     ]

@@ -126,7 +126,7 @@ class Rig(RigData, Result):
 
     @property
     def place(self) -> str:
-        """What faults call the rig: its file, or the name of a shipped one or one without file."""
+        """The rig in error messages: its file; its name if it is shipped or has no file."""
         shipped = self.file is None or self.file.is_relative_to(aircraft_folder())
         return self.name if shipped else str(self.file)
 

@@ -370,6 +370,20 @@ def test_an_aircraft_whose_motion_is_within_its_noise_is_not_judged(healthy: Rec
     assert "shows little but noise" in found.stage("airframe").why
 
 
+def test_a_gentle_flight_is_judged_at_noise_of_more_than_a_tenth_of_its_motion(
+    healthy: Record,
+) -> None:
+    """A healthy record of a column had an ambiguous airframe, at 12 %."""
+    data = healthy.data.copy()
+    data[:, 1:] = data[0, 1:] + 0.015 * (data[:, 1:] - data[0, 1:])
+    quiet = with_noise(without(Record(healthy.channels, data), *LATERAL))
+    rig = trimmed(at_rate_of(alone(), {"log": quiet}), {"log": quiet})[0]["log"]
+    hidden = [one.hidden_gap for one in airframe_outputs(rig, quiet)]
+    shares = [one.share for one in hidden if one is not None]
+    assert 0.1 < min(shares) < 0.3
+    assert not all(one.much for one in hidden if one is not None)
+
+
 def test_an_axis_that_a_log_does_not_show_is_named(healthy: Record) -> None:
     trims, _ = trimmed(alone(), {"log": healthy})
     rig, noisy_log = trims["log"], with_noise(healthy)

@@ -59,7 +59,7 @@ def test_a_force_computed_from_the_record_does_not_show_the_multiplier(
     computed = {"r.csv": Record(record.channels, data, record.manifest)}
     prepared = prepare(rig, computed, Part("column"))
     assert any(one.stage == "multiplier" for one in prepared.case.outputs) is shown
-    said = "column_modifying_force_N of r.csv was computed from the δc in it"
+    said = "column_modifying_force_N of r.csv was computed from the recorded column_computed_m"
     assert any(words.startswith(said) for words in prepared.left_out) is not shown
 
 

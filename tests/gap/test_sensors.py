@@ -238,7 +238,7 @@ def test_a_repeating_sensor_is_no_alternative_to_an_effect_that_explains_nothing
 
 
 def test_slow_noise_of_a_sensor_is_named_as_what_it_may_be(tmp_path: Path) -> None:
-    """It was a gap that follows nothing, with no word of what leaves such a residual."""
+    """The summary did not say what may leave a small residual that no signal predicts."""
     rig = nominal_rig(False)
     record = made(tmp_path, rig, {}, 33)
     data, at = record.data.copy(), record.channels.index("column_deflection_m")
@@ -251,4 +251,4 @@ def test_slow_noise_of_a_sensor_is_named_as_what_it_may_be(tmp_path: Path) -> No
     found = findings(prepared, *search_sets(prepared.case, library))
     assert found.guilty == ("linkage",)
     assert "no function of the stage's signals" in found.summary
-    assert "slow noise of its sensors looks so" in found.summary
+    assert "slow noise of a sensor would leave the same" in found.summary

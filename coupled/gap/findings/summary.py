@@ -299,7 +299,8 @@ def _remains(stage: str, left: Remains, effects: bool) -> str:
         said += f"{100 * most.share:.0f} % {follows} {_signal(most.signal)}, and "
     share = round(100 * left.free_share)
     if share < 100.0 * MINOR:
-        slow = "" if left.follows or left.gap > DOUBLED else "; slow noise of its sensors looks so"
+        seen = "; slow noise of a sensor would leave the same"
+        slow = "" if left.follows or left.gap > DOUBLED else seen
         return f"{said}no function of the stage's signals predicts held-out stretches{slow}."
     of = "the stage's own signals" if left.free_in == "all" else _signal(left.free_in)
     return f"{said}{share} % could be some function of {of}."
@@ -334,12 +335,12 @@ def _sure(found: Findings) -> str:
 
 
 def _undone(found: Findings) -> str:
-    """Return a sentence on effects that undo each other where the record has no gap."""
+    """Return a sentence on effects that cancel each other in channels without a gap."""
     known = [(plain(e.name), e.credibility) for e in found.effects]
     names = [name for name, tests in known if tests is not None and tests.undone > 1.0]
     if len(names) < 2:
         return ""
-    return f" {capital(' and '.join(names))} undo each other where the record has no gap."
+    return f" {capital(' and '.join(names))} cancel each other in a channel that has no gap."
 
 
 def closes(shrink: Shrink) -> str:

@@ -334,9 +334,10 @@ class Reader(Reading):
 
     @cached_property
     def repeats_product(self) -> bool:
-        """Whether F_mod of an analog product is no reading: it has no noise but that of δc as read.
+        """Whether F_mod was computed from δc as read: its only noise is that of δc.
 
-        A recorder, or the host, has computed it. The loader's motion tells which product acted.
+        A measured F_mod of an analog multiplier has noise of its own. A computed one does not show
+        which multiplier acts; the motion of the loader does.
         """
         analog = self.rig.controls[self.control].loader.multiplier != "digital"
         if not analog or self.moved or self.set_points or "multiplier" in self.missing():

@@ -26,7 +26,7 @@ CONTROLS: dict[ControlName, frozenset[str]] = {
     "wheel": _set("wheel whl aileron ail roll lat lateral handrad"),
     "pedals": _set("pedals pedal ped rudder rud yaw dir directional pedale"),
 }
-# Words of a setpoint: a force with one is not the measured force if another one is there.
+# Words of a setpoint: a force column with one of them is proposed only if there is no other.
 COMMANDS = _set("cmd command commanded target setpoint ref soll")
 QUANTITIES = {
     "modifying_force": _set("fmod modifying"),
