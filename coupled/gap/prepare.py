@@ -205,7 +205,7 @@ def prepare(
     left_out = [stepped, *(why for one in live for why in one.left_out), *repeated]
     left_out += [
         f"{channel(control, 'modifying_force')} of {file} was computed from the recorded "
-        f"{channel(control, 'computed')}: it does not show which multiplier acts."
+        f"{channel(control, 'computed')}: it cannot discriminate analog and digital multipliers."
         for file, reader in zip(records, readers, strict=True)
         if part.own and reader.repeats_product
     ]

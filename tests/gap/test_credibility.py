@@ -263,10 +263,7 @@ def test_a_hysteresis_of_the_pressure_is_no_lag(lag_s: float, width_Pa: float) -
 
 @pytest.mark.parametrize("acts", [0.0, 1.0])
 def test_effects_that_undo_each_other_where_there_is_no_gap_are_not_the_cause(acts: float) -> None:
-    """A force computed from the record's own deflection was a product held by the host.
-
-    The change that this makes of the motion was undone by 13 % more damping, at 0.89 both.
-    """
+    """With an F_mod computed from δc, a digital multiplier and 13 % more damping cancelled."""
     rng, frames = np.random.default_rng(6), 3000
     first, second, noise, more = rng.normal(size=(4, frames))
     offset, weight = BY_NAME["force_offset"], BY_NAME["bob_weight"]

@@ -50,7 +50,7 @@ def test_the_floor_of_a_digital_product_is_that_of_an_analog_one(tmp_path: Path)
 def test_a_force_computed_from_the_record_does_not_show_the_multiplier(
     tmp_path: Path, own_N: float, shown: bool
 ) -> None:
-    """A healthy bench with such a column was a digital multiplier and 13 % more damping."""
+    """A healthy bench was diagnosed as a digital multiplier with 13 % more damping."""
     rig = nominal_rig(False)
     record = made(tmp_path, rig, {}, 3)
     product = Reader(rig, record, "column", surface_points)._product(record["column_computed_m"])

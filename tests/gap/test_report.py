@@ -147,8 +147,8 @@ def test_the_summary_names_size_certainty_and_share(tmp_path: Path) -> None:
 def test_the_table_of_a_folder_says_why_a_record_was_refused() -> None:
     why = "column_force_N: row 7 holds 'x', no number"
     row = Row("a", "mine", "refused", (), (), (), (), None, why)
-    (told,) = csv.DictReader(summary([row]).splitlines())
-    assert (told["verdict"], told["why"]) == ("refused", why)
+    (line,) = csv.DictReader(summary([row]).splitlines())
+    assert (line["verdict"], line["why"]) == ("refused", why)
 
 
 @pytest.mark.slow

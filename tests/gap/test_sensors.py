@@ -223,7 +223,7 @@ def test_a_motion_of_the_models_sign_is_judged(flown: Record) -> None:
 def test_a_repeating_sensor_is_no_alternative_to_an_effect_that_explains_nothing(
     tmp_path: Path,
 ) -> None:
-    """A dead zone of the transducer was ambiguous, beside a bend of probability 4e-5."""
+    """With a dead zone of the transducer and a bend of probability 4e-5, the verdict was wrong."""
     rig = nominal_rig(True)
     record = made(tmp_path, rig, {}, 31)
     data, at = record.data.copy(), record.channels.index("column_deflection_m")

@@ -276,7 +276,7 @@ def test_a_law_that_fits_worse_than_one_it_contains_is_not_at_its_end() -> None:
 def test_a_mode_that_may_be_faster_than_the_frames_show_is_no_effect(
     frame_rate_Hz: float, possible: bool
 ) -> None:
-    """Twenty minutes of a bend were a bend and a force scale, beside a mode at half of the rate."""
+    """In a record of 20 min a bend was diagnosed as a bend and a force scale."""
     mode = BY_NAME["structural_mode"]
 
     def predict(rig: Rig) -> Floats:

@@ -10,9 +10,8 @@
    It is small for a wrong effect, since functions of the signals remove the same. The comparison is
    omitted for effects from outside the stage, such as gusts. The motion of an aircraft is no
    function of its present signals, so the residual of the airframe counts in full.
-3. Outputs without a gap. If an output is within its noise without effects, a cause acts on it by
-   less than its noise. An effect that acts by more is undone there by another one, of which the
-   record shows nothing, or itself undoes one.
+3. Cancellation. If an output has no gap without effects, the action of a cause on this output is
+   below the noise. If two effects act by more than the noise and cancel, neither is credible.
 
 The first two weigh more the more residual power remains (`remainder`). The result is one smooth
 number that scales the effect's probability.
@@ -190,8 +189,8 @@ class Credibility:
     `remainder` is the weight of the residual that remains, 0 to 1 (`remainder`). `beside_flexible`
     is None if hardly any residual remains. `in_full`: no residual may remain, since the model of
     signals has no power. `exact`: the stage is computed by the host without noise, so the limit of
-    the drift is lower too. `undone` is the power of the effect in outputs without a gap, beyond
-    that of which their noise has room, relative to this power.
+    the drift is lower too. `undone` is the power of the effect's action on an output without a gap,
+    relative to the power that its limit allows, less 1: the largest of all outputs, at least 0.
     """
 
     effect: str
@@ -275,7 +274,7 @@ def credibility(
 
 
 def _undone(case: Case, found: Fit, acts: Sequence[Acts]) -> float:
-    """Return by how much an effect acts on outputs that have no gap without effects (`undone`).
+    """Return the excess action of an effect on outputs without a gap (`Credibility.undone`).
 
     The nuisance parameters are those fitted with the effects.
     """

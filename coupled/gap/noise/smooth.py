@@ -252,9 +252,9 @@ class Smoother:
     def of_imposed(cls, signal: Floats, noise: Noise) -> Smoother:
         """Return the best smoother of an imposed motion, whose ends are not judged.
 
-        Its second derivative counts, so that noise at frequencies where nothing moves must be
-        removed. The extension changes the curvature at the ends: included in the choice, the ends
-        would keep that noise at high frame rates.
+        The loader's force follows from the second derivative, so noise above the bandwidth of the
+        motion must be removed. The extension of the signal has a step of curvature at the ends. The
+        ends are left out of the choice, because this step would raise the cutoff frequency.
         """
         whole = np.ascontiguousarray(signal, dtype=np.float64).tobytes()
         return _known(whole, MOTION_ORDERS, noise, False, True)
@@ -367,7 +367,7 @@ def _gain(long: Floats, orders: Sequence[int], memory: float, inside: int | None
 
 
 def unjudged(gain: Floats, frames: int) -> int:
-    """Return at how many frames at either end a smoother bends a motion that goes on there."""
+    """Return the number of frames at each end where smoothing distorts a moving signal."""
     return min(_memory_of(gain), int(SMALL * frames))
 
 

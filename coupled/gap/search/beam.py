@@ -664,7 +664,7 @@ def _choose(beam: Beam, rounds: tuple[dict[str, float], ...]) -> Choice:
 
 
 def _determined(beam: Beam, ranked: Sequence[Names]) -> Names:
-    """Return the first set near the best whose sizes are determined; if there is none, the best."""
+    """Return the best admissible set within `RIVAL_GAIN` of the best; else the best set."""
     near = [names for names in ranked if beam.log(names) > beam.log(ranked[0]) - RIVAL_GAIN]
     sure = (names for names in near if names and is_admissible(beam.problem, beam.fits[names]))
     return next(sure, ranked[0])

@@ -417,7 +417,9 @@ def _output(
     loose, lasts = spread(errors, own, noise.memory, rate_Hz), lasting(errors, floor)
     given = (measured, predict, floor, rate_Hz, model.number, loose, moved_by / floor)
     made = Output("airframe", name, *given, errors=errors, lasts=lasts)
-    if name in SLOW:  # they drift far with the phugoid, while all that damps the rates is hidden
+    if (
+        name in SLOW
+    ):  # the phugoid moves these channels far even if all rates are within their noise
         return made
     noisiest = "the surfaces" if moved_by > own else name
     share = floor / float(np.std(measured))

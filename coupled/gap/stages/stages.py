@@ -336,8 +336,8 @@ class Reader(Reading):
     def repeats_product(self) -> bool:
         """Whether F_mod was computed from δc as read: its only noise is that of δc.
 
-        A measured F_mod of an analog multiplier has noise of its own. A computed one does not show
-        which multiplier acts; the motion of the loader does.
+        A measured F_mod of an analog multiplier has noise of its own. A computed
+        F_mod cannot discriminate the multipliers; the motion of the loader can.
         """
         analog = self.rig.controls[self.control].loader.multiplier != "digital"
         if not analog or self.moved or self.set_points or "multiplier" in self.missing():
