@@ -30,6 +30,42 @@ def test_a_tolerance_of_the_file_is_that_of_the_setting() -> None:
     assert (friction.low, friction.high) == (-2.0, 3.0)  # no more than what is filed comes off
 
 
+def test_a_tolerance_of_a_value_that_no_effect_has_alone_is_used() -> None:
+    servo = {"servo_frequency_Hz": 18.0, "servo_damping_ratio": 0.6}
+    given = {"controls.column.tolerance": {"loader.servo_damping_ratio": 0.3}}
+    [ratio] = settings(bench(servo).changed(given), "column")["loader.servo_damping_ratio"].free
+    assert (ratio.low, ratio.high) == pytest.approx((0.5, 1.5))
+    assert "loader.servo_damping_ratio" not in settings(bench(servo), "column")
+
+
+def test_a_tolerance_of_a_filed_contact_is_used() -> None:
+    key = "loader.friction_stiffness_N_per_m"
+    given = {"controls.column.tolerance": {key: 2e4}}
+    filed = bench({"friction_N": 2.0, "friction_stiffness_N_per_m": 1e5}).changed(given)
+    names = {p.key for one in settings(filed, "column").values() for p in one.free}
+    assert "loader.friction_stiffness_N_per_{d}" in names
+    # A contact that is not filed is a nuisance parameter already.
+    open_ = bench({"friction_N": 2.0}).changed(given)
+    names = {p.key for one in settings(open_, "column").values() for p in one.free}
+    assert "loader.friction_stiffness_N_per_{d}" not in names
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("half", "within"), [(0.2, True), (0.02, False)])
+def test_a_servos_damping_within_its_tolerance_is_no_gap(
+    tmp_path: Path, half: float, within: bool
+) -> None:
+    key = "loader.servo_damping_ratio"
+    rough = nominal_rig(False).changed({LOADER + "servo_frequency_Hz": 8.0})
+    rig = rough.changed({f"controls.column.{key}": 0.6, "controls.column.tolerance": {key: half}})
+    record = made(tmp_path, rough.changed({f"controls.column.{key}": 0.7}), {}, 4)
+    found = diagnose(rig, {"r": record.between(0.0, 15.0)})
+    assert (found.verdict == "no_gap") == within
+    if within:
+        [ratio] = [one for one in found.settings if one.name == "servo_damping_ratio"]
+        assert ratio.factor == pytest.approx(0.7 / 0.6, rel=0.05)
+
+
 def test_how_far_friction_yields_is_a_setting_where_the_file_does_not_say_it() -> None:
     for friction in ({"friction_N": 2.0}, {}):  # filed, or found
         length, share = (one.free[0] for one in contact(bench(friction), "column"))

@@ -35,6 +35,10 @@ from coupled.rig.rig import Rig
 # A time stamp error of the force, within the tolerance of a recorder's clocks.
 CLOCK = setting_of(BY_NAME[STAMP], -CLOCK_s, CLOCK_s, 0.0)
 CONTACT = ("loader.friction_stiffness_N_per_{d}", "loader.friction_elastic_share")
+# The keys that an effect has alone.
+ALONE = frozenset(
+    effect.free[0].key for effect in EFFECTS if len(effect.parameters) == 1 and effect.free
+)
 
 
 def settings(rig: Rig, control: ControlName, outputs: Sequence[Output] = ()) -> dict[str, Effect]:
@@ -50,7 +54,7 @@ def settings(rig: Rig, control: ControlName, outputs: Sequence[Output] = ()) -> 
         return {MOTION: setting_of(BY_NAME[MOTION], -half_s, half_s, 0.0)}
     given, found = rig.controls[control].tolerance, dict[str, Effect]()
     in_series = any(output.in_series for output in outputs)
-    for effect in EFFECTS:
+    for effect in (*EFFECTS, *_only_beside_others(rig, control)):
         ends = _ends(effect, rig, control)
         if ends is None:
             continue
@@ -60,6 +64,22 @@ def settings(rig: Rig, control: ControlName, outputs: Sequence[Output] = ()) -> 
         both = in_series and effect.stage == "linkage"
         found[effect.name] = replace(setting, outputs=("linkage", "loader")) if both else setting
     return found
+
+
+def _only_beside_others(rig: Rig, control: ControlName) -> list[Effect]:
+    """Return the parameters with a tolerance in the rig file that no effect has alone.
+
+    Each is an effect by the name of its key, as the damping ratio of `servo_tuning`.
+    """
+    given = rig.controls[control].tolerance
+    free = {p.key for one in contact(rig, control) for p in one.free}
+    found = {
+        p.key: replace(effect, name=p.key, parameters=(p,))
+        for effect in EFFECTS
+        for p in effect.free
+        if p.key not in ALONE | free and p.key_on(control) in given
+    }
+    return list(found.values())
 
 
 def lag_within_a_step(rig: Rig) -> Effect:

@@ -22,6 +22,7 @@ import numpy as np
 
 from coupled.display import unit_in
 from coupled.gap.effects.effect import Effect
+from coupled.gap.effects.settings import ALONE
 from coupled.gap.findings.budget import by_stretch
 from coupled.gap.findings.changed import Comparison, compare
 from coupled.gap.findings.result import StageResult, Verdict
@@ -115,6 +116,8 @@ def tolerances(case: Case, found: Fit) -> dict[str, float]:
 
     They are `SIGMAS` standard deviations between records. For a single record they are
     those between its halves, and at least a share of the effect, as both halves have one motion.
+    Parameters that an effect has only beside others stay as fitted: some records do not determine
+    them, and their scatter would then absorb a change of another parameter.
     """
     numbers = sorted({output.record for output in case.outputs})
     single = len(numbers) == 1
@@ -128,7 +131,7 @@ def tolerances(case: Case, found: Fit) -> dict[str, float]:
     for effect in found.effects:
         for p in effect.free:
             key, name = p.key_on(case.control), effect.value_key(p)
-            if key.startswith("flight."):
+            if key.startswith("flight.") or p.key not in ALONE:
                 continue
             filed = float(p.nominal(case.nominal, case.control))
             each = [float(p.entered(filed, one.values[name])) for one in fits]

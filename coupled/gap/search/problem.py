@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from coupled.gap.effects.effect import Effect, possible
-from coupled.gap.effects.library import BY_NAME
+from coupled.gap.effects.library import BY_NAME, EFFECTS
 from coupled.gap.effects.settings import is_dry
 from coupled.gap.search.case import Case
 from coupled.gap.search.descent import WHOLE, Descent
@@ -181,6 +181,7 @@ class Problem:
 def _unlimited(name: str, setting: Effect) -> Effect:
     """Return a nuisance parameter with the bounds of the effect that frees the same key."""
     (p,) = setting.free
-    effect = BY_NAME[name].free[0]
-    low, high = min(p.low, effect.low), max(p.high, effect.high)
+    effects = (BY_NAME[name],) if name in BY_NAME else EFFECTS
+    freed = next(q for effect in effects for q in effect.free if q.key == p.key)
+    low, high = min(p.low, freed.low), max(p.high, freed.high)
     return replace(setting, parameters=(replace(p, low=low, high=high, may_end=True),))
