@@ -23,6 +23,7 @@ _COLORS = {stage.name: stage.color for stage in CHAIN}
 _LINEAR = 10.0  # gain up to which the axis is linear
 _ROOM = 12.0  # beyond the bars, for their numbers
 _HALF = 0.38  # of a rung's width
+_WIDE = 62  # characters of a headline
 Gaps = list[dict[str, float]]
 
 
@@ -104,9 +105,9 @@ def _draw_round(axes: Any, view: View, k: int, rounds: list[dict[str, float]], g
 def _headline(k: int, step: Found | None) -> str:
     if step is None:
         return f"depth {k + 1}: nothing gains"
-    rivals = " or ".join(plain(rival.effect.name) for rival in step.rivals)
-    doubt = f" (or {rivals})" if rivals else ""
-    return f"depth {k + 1}: {plain(step.effect.name)}{doubt}"
+    rivals = ", ".join(dict.fromkeys(plain(rival.effect.name) for rival in step.rivals))
+    doubt = f" (rivals: {rivals})" if rivals else ""
+    return textwrap.fill(f"depth {k + 1}: {plain(step.effect.name)}{doubt}", _WIDE)
 
 
 def _write_gain(axes: Any, place: int, gain: float, weight: str) -> None:
@@ -268,7 +269,7 @@ def _draw_numbers(axes: Any, lines: list[tuple[str, str, str]]) -> None:
         loc="upper center",
         cellLoc="left",
         colLoc="left",
-        colWidths=[0.45, 0.2, 0.35],
+        colWidths=[0.4, 0.3, 0.3],
         edges="horizontal",
     )
     table.auto_set_font_size(False)

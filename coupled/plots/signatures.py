@@ -26,6 +26,7 @@ _BINS = 36
 _FEW = 4  # of them, at the least, under one median
 _DOTS = 3000
 _LOOP_s = 5.0
+_SHOWN = (0.5, 99.5)  # percentiles of the values within the axes
 
 
 @dataclass(frozen=True)
@@ -112,7 +113,11 @@ def _draw_law(
     axes.set_xlabel(x.label_on(control), fontsize=9)
     inner = slice(_EDGE, -_EDGE)
     at, seen = x.get(scene, None)[inner], y.get(scene, None)[inner]
-    known = [(m, x.get(scene, m.rig)[inner], y.get(scene, m.rig)[inner]) for m in models]
+    wide, high = _reach(at), _reach(seen)
+    known = [
+        (m, _within(wide, x.get(scene, m.rig)[inner]), _within(high, y.get(scene, m.rig)[inner]))
+        for m in models
+    ]
     rows = _widest_window(seen - known[0][2], round(_LOOP_s * scene.frame_rate))
     if signature.drawing == "loop":
         axes.plot(at, seen, ".", color="0.75", markersize=1.5, zorder=0, rasterized=True)
@@ -128,15 +133,29 @@ def _draw_law(
         axes.plot(*_medians(at, seen), "o", color=look.MEASURED, markersize=3.5, zorder=4)
         title = "dots: measured; black: their medians; lines: medians"
     axes.set_title(title, fontsize=9, loc="left")
-    _limit(axes, [seen, *(up for _, _, up in known)])
+    axes.set_xlim(_ends([at, *(across for _, across, _ in known)]))
+    axes.set_ylim(_ends([seen, *(up for _, _, up in known)]))
 
 
-def _limit(axes: Any, series: Sequence[Floats]) -> None:
-    """Let the few dots that a derivative throws far out not set the scale."""
-    ends = np.array([np.nanpercentile(up, [0.5, 99.5]) for up in series])
-    low, high = float(ends[:, 0].min()), float(ends[:, 1].max())
+def _reach(measured: Floats) -> tuple[float, float]:
+    """Return how far a model is drawn: the measured values' span beyond them."""
+    low, high = np.nanpercentile(measured, _SHOWN)
+    span = float(high - low) or 1.0
+    return float(low - span), float(high + span)
+
+
+def _within(ends: tuple[float, float], values: Floats) -> Floats:
+    """Return values with NaN beyond the ends: where a replay restarts, derivatives are no motion."""
+    return np.where((values >= ends[0]) & (values <= ends[1]), values, np.nan)
+
+
+def _ends(series: Sequence[Floats]) -> tuple[float, float]:
+    """Return the ends of an axis, without the few dots that a derivative throws far out."""
+    known = [one for one in series if np.isfinite(one).any()]
+    each = np.array([np.nanpercentile(one, _SHOWN) for one in known])
+    low, high = float(each[:, 0].min()), float(each[:, 1].max())
     room = 0.15 * (high - low) or 1.0
-    axes.set_ylim(low - room, high + room)
+    return low - room, high + room
 
 
 def _medians(x: Floats, y: Floats) -> tuple[Floats, Floats]:

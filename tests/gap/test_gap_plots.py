@@ -38,6 +38,7 @@ from coupled.rig.rigfile import read_rig
 from tests.support.airframes import noisy, pulses
 from tests.support.commands import coupled
 from tests.support.gaps import made, nominal_rig
+from tests.support.machines import slider, slider_rig
 
 SYSTEMS: tuple[System, System] = ("si", "us")
 Case = tuple[Rig, Record, tuple[Output, ...]]
@@ -211,6 +212,27 @@ def test_what_was_lost_on_the_way_is_drawn_without_it(cases: Mapping[bool, Case]
 def drawn_x(figure: Figure) -> float:
     """Return how far the law's dots go along the bottom."""
     return float(np.nanmax(np.abs(np.asarray(figure.axes[0].lines[0].get_xdata(), float))))
+
+
+def test_restarts_of_a_replay_do_not_set_the_scale_of_a_signature() -> None:
+    """A machine without a spring is replayed between restarts, where its speed jumps."""
+    found = diagnose(slider_rig(), {"r": slider(1, 0.6)})
+    [part] = found.parts
+    law = draw_signature(View(part)).axes[0]
+    measured, *rigs, medians = (np.asarray(line.get_xydata()) for line in law.lines)
+    wide, high = np.ptp(measured, axis=0)
+    assert np.ptp(law.get_xlim()) < 4.0 * wide and np.ptp(law.get_ylim()) < 4.0 * high
+    middle = np.median(rigs[1], axis=0)
+    assert middle == pytest.approx(np.median(medians, axis=0), rel=0.2)
+
+
+def test_rivals_of_an_effect_are_named_once_above_its_gains(cases: Mapping[bool, Case]) -> None:
+    diagnosis = diagnosis_of(cases[False], [BY_NAME["bend"]], BY_NAME["soft_backlash"])
+    (step,) = diagnosis.choice.steps
+    twice = replace(step, rivals=step.rivals * 2)
+    figure = draw_diagnosis(replace(diagnosis, choice=replace(diagnosis.choice, steps=(twice,))))
+    titles = [axes.get_title(loc="left") for axes in figure["ladder.png"].axes]
+    assert titles[0] == "depth 1: bend (rivals: soft backlash)"
 
 
 def test_a_signature_is_drawn_in_us_units(cases: Mapping[bool, Case]) -> None:
