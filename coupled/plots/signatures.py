@@ -145,7 +145,7 @@ def _reach(measured: Floats) -> tuple[float, float]:
 
 
 def _within(ends: tuple[float, float], values: Floats) -> Floats:
-    """Return values with NaN beyond the ends: where a replay restarts, derivatives are no motion."""
+    """Return values with NaN beyond the ends, as of derivatives where a replay restarts."""
     return np.where((values >= ends[0]) & (values <= ends[1]), values, np.nan)
 
 
