@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from coupled.display import System
+from coupled.gap.chain import AIRFRAME
 from coupled.gap.chain import BY_NAME as STAGE_OF
 from coupled.gap.effects.effect import Effect, Signature, touched
 from coupled.gap.effects.library import WHOLE_s
@@ -19,6 +20,7 @@ from coupled.plots import gapview as look
 from coupled.plots.gapview import View, channel_shown, style_of
 from coupled.plots.signals import SIGNALS, Scene
 from coupled.plots.structure import draw_structure
+from coupled.rig.packing import COMMAND_SIGN
 from coupled.rig.rig import Rig
 
 _EDGE = 12  # frames at a record's ends that a derivative spoils
@@ -27,6 +29,15 @@ _FEW = 4  # of them, at the least, under one median
 _DOTS = 3000
 _LOOP_s = 5.0
 _SHOWN = (0.5, 99.5)  # percentiles of the values within the axes
+# The surface that is drawn beside a channel of the motion, else the elevator; where each turns to.
+_TURNS = {
+    "roll_rate_rad_per_s": "aileron",
+    "roll_rad": "aileron",
+    "yaw_rate_rad_per_s": "rudder",
+    "sideslip_rad": "rudder",
+    "heading_rad": "rudder",
+}
+_WAYS = {"elevator": "nose up", "aileron": "right wing down", "rudder": "nose right"}
 
 
 @dataclass(frozen=True)
@@ -221,8 +232,12 @@ def _draw_zoom(
 def _input(view: View, output: Output) -> tuple[str, Floats] | None:
     """Return what drives an output's stage, where the record has it."""
     control, record = view.diagnosis.part.control, view.records[output.record]
+    if output.stage == AIRFRAME:
+        surface = _TURNS.get(output.channel, "elevator")
+        if f"{surface}_rad" not in record:
+            return None
+        sign, way = COMMAND_SIGN[surface], _WAYS[surface]
+        return f"{surface}, {way}", sign * record[f"{surface}_rad"]
     label, name = STAGE_OF[output.stage].drive if output.stage in STAGE_OF else ("", "")
     name = f"{control}_force_N" if name == "force" else name
-    if name not in record:
-        return None
-    return label, (-1.0 if name == "elevator_rad" else 1.0) * record[name]
+    return (label, record[name]) if name in record else None

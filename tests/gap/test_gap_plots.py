@@ -214,6 +214,23 @@ def drawn_x(figure: Figure) -> float:
     return float(np.nanmax(np.abs(np.asarray(figure.axes[0].lines[0].get_xdata(), float))))
 
 
+@pytest.mark.parametrize(
+    ("effect", "surface"),
+    [("roll_damping", "aileron"), ("yaw_damping", "rudder")],
+)
+def test_motion_is_drawn_beside_the_surface_that_turns_it(
+    lateral: Case, effect: str, surface: str
+) -> None:
+    nominal, *_ = lateral
+    other = fly_force(noisy(nominal).changed({f"flight.{effect}": 0.4}), pulses(nominal, 12.0), 3)
+    outputs = airframe_outputs(nominal, other)
+    figure = draw_signature(View(diagnosis_of((nominal, other, outputs), [BY_NAME[effect]])))
+    axes = figure.axes[1]
+    assert axes.get_legend_handles_labels()[1][0].startswith(f"{surface}, ")
+    drawn, motion = (np.asarray(line.get_ydata(), float) for line in axes.lines[:2])
+    assert np.corrcoef(drawn[6:-6], motion[12:] - motion[:-12])[0, 1] > 0.3
+
+
 def test_restarts_of_a_replay_do_not_set_the_scale_of_a_signature() -> None:
     """A machine without a spring is replayed between restarts, where its speed jumps."""
     found = diagnose(slider_rig(), {"r": slider(1, 0.6)})
