@@ -222,8 +222,10 @@ def test_motion_is_drawn_beside_the_surface_that_turns_it(
     lateral: Case, effect: str, surface: str
 ) -> None:
     nominal, *_ = lateral
-    other = fly_force(noisy(nominal).changed({f"flight.{effect}": 0.4}), pulses(nominal, 12.0), 3)
-    outputs = airframe_outputs(nominal, other)
+    other = fly_force(
+        noisy(nominal).changed({f"flight.{effect}": 0.4}), pulses(nominal, 12.0), seed=3
+    )
+    outputs = (*airframe_outputs(nominal, other),)
     figure = draw_signature(View(diagnosis_of((nominal, other, outputs), [BY_NAME[effect]])))
     axes = figure.axes[1]
     assert axes.get_legend_handles_labels()[1][0].startswith(f"{surface}, ")
