@@ -17,7 +17,7 @@ predicted once, from all measured surfaces. It is the only part of a rig without
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
@@ -27,12 +27,13 @@ from coupled.gap.chain import AIRFRAME, STAGES, Part
 from coupled.gap.checks import unmeasured_trim
 from coupled.gap.effects.library import MOTION
 from coupled.gap.findings.answer import effects_of, incredible, settings_of, verdict_of
-from coupled.gap.findings.budget import floors_of, shrink, stage_budget
+from coupled.gap.findings.beside import beside_closed_form
+from coupled.gap.findings.budget import StageBudget, floors_of, shrink, stage_budget
 from coupled.gap.findings.curves import find_curves
 from coupled.gap.findings.diagnosis import Diagnosis, PartDiagnosis, WholeDiagnosis
 from coupled.gap.findings.healthy import Baseline, beside_healthy
 from coupled.gap.findings.judge import Judge
-from coupled.gap.findings.result import EffectResult, StageResult
+from coupled.gap.findings.result import EffectResult, StageResult, Verdict
 from coupled.gap.findings.where import lone_channel
 from coupled.gap.prepare import Prepared, prepare
 from coupled.gap.search.case import Case, Tell
@@ -227,28 +228,27 @@ def _told(tell: Tell | None, part: Part, parts: Collection[Part]) -> Tell | None
 def findings(prepared: Prepared, case: Case, choice: Choice) -> PartDiagnosis:
     """Return the diagnosis from a search; `case` has the final noise floors."""
     part, readers, baseline = prepared.part, prepared.readers, prepared.baseline
-    fit, outputs = choice.fit, list(case.outputs)
-    judge = Judge(readers, outputs, choice, case.gaps(fit.rig))
-    stages = _of_part(part, judge.stages())
-    effects = effects_of(case, choice, readers, stages)
-    if unsure := incredible(choice, effects):
-        stages = _of_part(part, replace(judge, doubted=unsure).stages())
+    outputs, records = list(case.outputs), [reader.record for reader in readers]
+    judged, curves, beside = _judged(prepared, case, choice), None, None
+    if part.own and judged.verdict != "no_gap":
+        curves = find_curves(case, choice, judged.effects, records)
+    if curves is not None:
+        beside = beside_closed_form(judged.judge, case, judged.effects, curves)
+        effects = tuple(map(curves.probable, judged.effects))
+        if beside is not None:
+            choice, curves, effects = beside.choice, beside.curves, beside.effects
+        judged = _judged(prepared, case, choice, effects)
+    fit, stages, effects, verdict = choice.fit, judged.stages, judged.effects, judged.verdict
     fitted = Problem(case).fit(fit.effects, fit.values, descent=Descent("own"), part="fitted")
+    if beside is not None:
+        fitted = beside.fitted
     floors = floors_of(case, choice)
     faulty = [stage.name for stage in stages if stage.guilty]
     unknown = unmeasured_trim(case.nominal, prepared.records) if AIRFRAME in faulty else ""
-    budgets = [stage_budget(name, case, choice.without_effects, fit, floors) for name in faulty]
-    budget = tuple(one for one in budgets if one is not None)
     change = None
     if baseline is not None:
-        records = list(prepared.records.values())
-        change = baseline.compared(records, prepared.case.outputs, part.own)
-    verdict, curves = verdict_of(choice, stages, effects, budget), None
-    if part.own and verdict != "no_gap":
-        curves = find_curves(case, choice, effects, [reader.record for reader in readers])
-    if curves is not None and curves.instead:
-        effects = tuple(map(curves.probable, effects))
-        verdict = verdict_of(choice, stages, effects, budget)
+        named = list(prepared.records.values())
+        change = baseline.compared(named, prepared.case.outputs, part.own)
     if other := {one.name for one in effects if prepared.is_otherwise(one)}:
         effects = tuple(
             replace(one, probability=MOST * one.probability) if one.name in other else one
@@ -268,7 +268,7 @@ def findings(prepared: Prepared, case: Case, choice: Choice) -> PartDiagnosis:
         verdict=verdict,
         stages=stages,
         effects=effects,
-        budget=budget,
+        budget=judged.budget,
         rivals=tuple(
             tuple(dict.fromkeys((s.effect.name, *(r.effect.name for r in s.rivals))))
             for s in choice.steps
@@ -290,6 +290,34 @@ def findings(prepared: Prepared, case: Case, choice: Choice) -> PartDiagnosis:
         inseparable=inseparable(fit, case.control),
         curved=curves,
     )
+
+
+@dataclass(frozen=True)
+class _Judged:
+    """The stages, effects and their shares in the gaps, and the verdict on them."""
+
+    judge: Judge
+    stages: tuple[StageResult, ...]
+    effects: tuple[EffectResult, ...]
+    budget: tuple[StageBudget, ...]
+    verdict: Verdict
+
+
+def _judged(
+    prepared: Prepared, case: Case, choice: Choice, effects: tuple[EffectResult, ...] | None = None
+) -> _Judged:
+    """Return the verdict on a choice, with given results of its effects if these are known."""
+    part, readers = prepared.part, prepared.readers
+    judge = Judge(readers, list(case.outputs), choice, case.gaps(choice.fit.rig))
+    stages = _of_part(part, judge.stages())
+    effects = effects_of(case, choice, readers, stages) if effects is None else effects
+    if unsure := incredible(choice, effects):
+        stages = _of_part(part, replace(judge, doubted=unsure).stages())
+    floors, root = floors_of(case, choice), choice.without_effects
+    faulty = [stage.name for stage in stages if stage.guilty]
+    budgets = [stage_budget(name, case, root, choice.fit, floors) for name in faulty]
+    budget = tuple(one for one in budgets if one is not None)
+    return _Judged(judge, stages, effects, budget, verdict_of(choice, stages, effects, budget))
 
 
 def _as_stamped(rig: Rig, filed: Rig, effects: Sequence[EffectResult]) -> Rig:

@@ -189,6 +189,33 @@ def test_effects_that_approximate_a_curve_are_less_probable_than_the_curve() -> 
     assert "It describes the gap better than " in found.summary
 
 
+@pytest.mark.parametrize("factor", [1.5, 1.0])
+def test_damping_found_before_a_curve_over_the_rate_is_fitted_beside_it(factor: float) -> None:
+    """Beside damping by the square of the speed, viscous damping was too large, and certain."""
+    rate = np.linspace(0.0, 0.4, 20)
+    square = {"rate_m_per_s": rate.tolist(), "force_N": (QUADRATIC * rate**2).tolist()}
+    damping = factor * COLUMN.loader.damping
+    found = diagnosed({"friction_curve": square, "damping_N_s_per_m": damping})
+    (effect,) = found.effects
+    assert effect.name == "viscous_damping"
+    (curve,) = found.curves
+    assert curve.like == "c·v·|v|"
+    if factor == 1.0:
+        assert effect.probability < 0.1
+        assert "It describes the gap better than viscous damping" in found.summary
+        return
+    assert effect.probability > 0.6
+    assert effect.parameters[0].value == pytest.approx(factor, rel=0.02)
+    nodes, values = np.array(curve.nodes), np.array(curve.values)
+    assert values == pytest.approx(QUADRATIC * nodes**2, rel=0.1, abs=0.05)
+    improved = found.improved.controls["column"].loader
+    assert improved.damping == pytest.approx(damping, rel=0.02)
+    assert not improved.friction_curve.nodes
+    with_curves = found.with_curves.controls["column"].loader
+    assert with_curves.damping == improved.damping
+    assert with_curves.friction_curve.nodes
+
+
 def test_effects_that_leave_noise_alone_keep_their_probability() -> None:
     found = diagnosed({"cubic_N_per_m3": 3e5, "damping_N_s_per_m": 105.0})
     assert found.verdict == "effect"
@@ -285,4 +312,6 @@ def test_a_closed_form_of_two_signals_is_named_if_it_fits_best(two: bool) -> Non
     basis = Basis(law, places, [output], [hats], [wanted], ModelError(np.zeros(1), np.ones(1)))
     pick = choose(basis, basis.sums("all"), ())
     other = {"c·δ·|v|": [product]}
-    assert closed_form(basis, pick, (), other) == ("c·δ·|v|" if two else "c·δ³")
+    form = closed_form(basis, pick, (), other)
+    assert form is not None
+    assert form.name == ("c·δ·|v|" if two else "c·δ³")

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
 from operator import attrgetter
@@ -35,6 +35,7 @@ from coupled.gap.thresholds import (
     PRIOR_NUMBER,
     PRIOR_SPAN,
     RIVAL_GAIN,
+    TINY,
     UNDERSTATED,
 )
 from coupled.record.channels import ControlName, unit_of
@@ -388,9 +389,22 @@ def _grown(basis: Basis, sums: Sums, start: Pick, ends: set[int]) -> Pick:
     return best
 
 
+@dataclass(frozen=True)
+class Form:
+    """A closed form that fits as well as a curve.
+
+    `curve` are its nodes and values, `errors` half of their 95 % intervals; None of a form of two
+    signals, and of one with a kink, whose place is known only roughly.
+    """
+
+    name: str
+    curve: Values | None = None
+    errors: Floats = field(default_factory=lambda: np.zeros(0))
+
+
 def closed_form(
     basis: Basis, curve: Pick, entries: Sequence[float], others: Mapping[str, Sequence[Floats]]
-) -> str:
+) -> Form | None:
     """Return the closed form with the largest evidence, if that is as large as the curve's.
 
     Beside it, a straight line is free: its slope and its level are effects of the library. `others`
@@ -404,27 +418,54 @@ def closed_form(
     unit = np.eye(len(basis.places) + len(others))
     on_places = unit[:, : len(basis.places)]
     forms = [(name, on_places @ form) for name, form in _forms(basis.law, basis.places, entries)]
+    exact = {name for name, _ in forms}
+    forms += [(name, on_places @ form) for name, form in _zones(basis.law, basis.places)]
     forms += zip(others, unit[len(basis.places) :, :, None], strict=True)
     lines = [np.empty((len(unit), 0)), *(on_places @ line for line in _lines(basis))]
-    best, name = curve.known.log - RIVAL_GAIN, ""
+    best, found = curve.known.log - RIVAL_GAIN, None
     for text, form in forms:
         for line in lines:
-            log = _log_of(sums.of(np.column_stack((form, line))))
-            if log > best:
-                best, name = log, text
-    return name
+            known = _free(sums.of(np.column_stack((form, line))))
+            if known is not None and known.log > best:
+                best, found = known.log, (text, form.ravel(), known)
+    if found is None:
+        return None
+    text, form, known = found
+    half = NORMAL_95 * UNDERSTATED * math.sqrt(float(known.covariance[0, 0]))
+    shape = form[: len(basis.places)]
+    if text not in exact:
+        return Form(text)
+    at = _bent_at(basis.places, shape)
+    return Form(text, (basis.places[at], known.theta[0] * shape[at]), half * np.abs(shape[at]))
+
+
+def _bent_at(places: Floats, shape: Floats) -> NDArray[np.intp]:
+    """Return the places that draw a form: its kinks if they are few, or else evenly spaced ones."""
+    slope = np.diff(shape) / np.diff(places)
+    kinks = np.flatnonzero(np.abs(np.diff(slope)) > TINY * np.max(np.abs(slope))) + 1
+    if len(kinks) > CURVE_NODES - 2:
+        even = np.linspace(places[0], places[-1], CURVE_NODES)
+        kinks = np.argmin(np.abs(places[:, None] - even), axis=0)
+    zero = np.flatnonzero(places == 0.0)
+    return np.unique(np.concatenate(([0, len(places) - 1], zero, kinks)))
 
 
 def _log_of(sums: Sums) -> float:
-    """Return the log evidence of a few independent sizes, each with a prior of its own width."""
+    """Return the log evidence of a few independent sizes (`_free`)."""
+    known = _free(sums)
+    return -math.inf if known is None else known.log
+
+
+def _free(sums: Sums) -> Posterior | None:
+    """Return a few independent sizes, of priors as wide; None without responses."""
     inner, along = sums.weighted()
     if not np.all(np.diag(inner) > 0.0):
-        return -math.inf
+        return None
     scale = 1.0 / np.sqrt(np.diag(inner))
     theta, *_ = np.linalg.lstsq(inner * np.outer(scale, scale), scale * along, rcond=None)
     theta *= scale
     width = WIDTH * np.maximum(np.abs(theta), scale)
-    return sums.posterior(np.diag(1.0 / width**2)).log
+    return sums.posterior(np.diag(1.0 / width**2))
 
 
 def _forms(law: Law, x: Floats, entries: Sequence[float]) -> Iterator[tuple[str, Floats]]:
@@ -441,6 +482,13 @@ def _forms(law: Law, x: Floats, entries: Sequence[float]) -> Iterator[tuple[str,
     if not law.by_size:
         yield f"c·{s}²", x**2
         yield f"c·|{s}|", size
+
+
+def _zones(law: Law, x: Floats) -> Iterator[tuple[str, Floats]]:
+    """Yield the closed forms with a kink, which may lie between two places, as `_forms` does."""
+    if law.stage == "schedule":
+        return
+    s, size = law.symbol, np.abs(x)
     zone = "dead zone" if law.is_map else "saturation"
     for k, at in enumerate(np.unique(size[size > 0.0])):
         yield f"{zone} at |{s}| = {at:.3g}", np.clip(x, -at, at)

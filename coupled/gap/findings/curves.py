@@ -14,8 +14,8 @@ the same size in all halves of the record. The curve of an intermittent or fadin
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -29,6 +29,7 @@ from coupled.gap.findings.credibility import Acts, regimes
 from coupled.gap.findings.curvefit import (
     LAWS,
     Basis,
+    Form,
     Law,
     Pick,
     Values,
@@ -83,8 +84,7 @@ class Curve:
 
     `key` is that of the rig file, `of` and `lists` its keys of the nodes and of the values. `unit`
     is that of the values, `low` and `high` their 95 % intervals. `closed` is the share of the gap
-    closed on held-out stretches, with its interval. `like` is a closed form that fits as well, or
-    empty.
+    closed on held-out stretches, with its interval. `form` is a closed form that fits as well.
     """
 
     key: str
@@ -98,8 +98,13 @@ class Curve:
     closed: float
     closed_low: float
     closed_high: float
-    like: str = ""
     lists: str = ""
+    form: Form | None = None
+
+    @property
+    def like(self) -> str:
+        """The name of the closed form, or empty."""
+        return "" if self.form is None else self.form.name
 
     @property
     def words(self) -> str:
@@ -128,15 +133,14 @@ class Curves:
     """The curves found, and the rig with the credible effects and with them.
 
     `shrink` is the reduction of the gap in each channel that they change, with curves that are
-    fitted to the other stretches. `instead` are the effects that the curves describe better, and
-    `odds` the odds of these effects against the curves.
+    fitted to the other stretches. `instead` are the effects that the curves describe better, each
+    with its odds against the curves.
     """
 
     found: tuple[Curve, ...]
     rig: Rig
     shrink: tuple[ChannelShrink, ...]
-    instead: frozenset[str] = frozenset()
-    odds: float = math.inf
+    instead: Mapping[str, float] = field(default_factory=dict)
 
     def better_than(self, names: Sequence[str]) -> str:
         """Return a sentence on those of some effects that the curves describe better."""
@@ -149,8 +153,28 @@ class Curves:
         """Return an effect with the probability that it has beside the curves."""
         if effect.name not in self.instead:
             return effect
-        share = self.odds / (1.0 + self.odds)
-        return replace(effect, probability=share * effect.probability)
+        odds = self.instead[effect.name]
+        return replace(effect, probability=odds / (1.0 + odds) * effect.probability)
+
+    def in_closed_form(self, case: Case) -> Curves | None:
+        """Return the curve in its closed form, with the nominal rig; None if it has none."""
+        form = self.found[0].form if len(self.found) == 1 else None
+        if form is None or form.curve is None:
+            return None
+        (one,) = self.found
+        law = next(law for law in LAWS if one.key == f"controls.{case.control}.{law.key}")
+        rig = with_curve(case.nominal, case.control, law, *form.curve)
+        if rig is None:
+            return None
+        nodes, values = form.curve
+        drawn = replace(
+            one,
+            nodes=tuple(nodes.tolist()),
+            values=tuple(values.tolist()),
+            low=tuple((values - form.errors).tolist()),
+            high=tuple((values + form.errors).tolist()),
+        )
+        return replace(self, found=(drawn,), rig=rig)
 
 
 def find_curves(
@@ -180,7 +204,7 @@ def find_curves(
     ahead = by_curves - max((by_effects, *by_both))
     if ahead < 0.0:
         return beside.curves(case)
-    return replace(instead, instead=ours, odds=math.exp(-ahead))
+    return replace(instead, instead=dict.fromkeys(ours, math.exp(-ahead)))
 
 
 @dataclass(frozen=True)
@@ -465,7 +489,7 @@ class _Fitter:
             closed=held.closed,
             closed_low=held.low,
             closed_high=held.high,
-            like=closed_form(basis, pick, self._entries(law), self._of_two_signals(basis)),
+            form=closed_form(basis, pick, self._entries(law), self._of_two_signals(basis)),
             lists=lists,
         )
 
