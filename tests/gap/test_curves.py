@@ -189,6 +189,7 @@ def test_effects_that_approximate_a_curve_are_less_probable_than_the_curve() -> 
     assert "It describes the gap better than " in found.summary
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("factor", [1.5, 1.0])
 def test_damping_found_before_a_curve_over_the_rate_is_fitted_beside_it(factor: float) -> None:
     """Beside damping by the square of the speed, viscous damping was too large, and certain."""
