@@ -66,7 +66,12 @@ def check_load(folder: Path, rig: Rig, file: object) -> None:
     flight = rig.flight
     if flight is None or (flight.cg_aft == 0.0 and flight.fuel == 1.0):
         return
-    plain = {"cg_aft": 0.0, "fuel": 1.0, "terms": {}, **{a.part.name: 1.0 for a in ALTERATIONS}}
+    plain = {
+        "cg_aft": 0.0,
+        "fuel": 1.0,
+        "terms": {},
+        **{a.part.name: a.part.neutral for a in ALTERATIONS},
+    }
     own = {"folder": str(folder / "aircraft"), "model_file": ""}
     exported = flight.model_copy(update={**plain, **own})
     frame_s, controls = 1.0 / rig.frame_rate, list(rig.controls)
@@ -113,7 +118,7 @@ def _with_factors(text: bytes, flight: Flight) -> bytes:
     for part, factor, about_trim in alterations(flight):
         if about_trim is not None:
             continue
-        neutral = part.settings(1.0)
+        neutral = part.settings(part.neutral)
         for name, value in part.settings(factor).items():
             declared = f'<property value="{neutral[name]:g}">{name}</property>'
             assert declared.encode() in text, name

@@ -68,7 +68,10 @@ def _changed(rig: Rig) -> str:
         changes.append(f"a centre of gravity {flight.cg_aft:g} m further aft")
     if flight.fuel != 1.0:
         changes.append(f"{flight.fuel:g} times the fuel")
-    changes += [f"{part.name} times {factor:g}" for part, factor, _ in alterations(flight)]
+    changes += [
+        f"{part.name} {'times' if part.neutral else 'of'} {factor:g}"
+        for part, factor, _ in alterations(flight)
+    ]
     return f", for {', '.join(changes)}" if changes else ""
 
 

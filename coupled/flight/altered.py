@@ -13,6 +13,8 @@ stays a moment, by whatever function the model uses, without side effects.
     roll_damping             C_lp: the rolling moment due to the roll rate
     yaw_damping              C_nr: the yawing moment due to the yaw rate
     pitch_stiffness          C_mα: the pitching moment due to the angle of attack; changes the trim
+    pitching_moment          a constant C_m that is added; changes the trim
+    lift_offset              a constant C_L that is added; changes the trim
     dihedral_effect          C_lβ: the rolling moment due to the sideslip
     directional_stability    C_nβ: the yawing moment due to the sideslip
     adverse_yaw              C_nδa: the yawing moment due to the ailerons
@@ -33,7 +35,17 @@ from numpy.typing import NDArray
 
 from coupled.flight.everyframe import TRIMS
 from coupled.flight.loading import INERTIAS
-from coupled.flight.modelparts import NothingToScaleError, Part, Scaled, Term, Thrust, Whole
+from coupled.flight.modelparts import (
+    FORCE,
+    MOMENT,
+    Constant,
+    NothingToScaleError,
+    Part,
+    Scaled,
+    Term,
+    Thrust,
+    Whole,
+)
 from coupled.flight.modeltext import ModelText
 from coupled.flight.wrapper import Aircraft, Hook, Wrapper, together
 from coupled.record.channels import ControlName
@@ -74,6 +86,8 @@ class Alteration:
 ALTERATIONS = (
     Alteration(Whole("drag", "force along the DRAG axis", ("DRAG",))),
     Alteration(Thrust()),
+    Alteration(Constant("pitching_moment", "PITCH", MOMENT)),
+    Alteration(Constant("lift_offset", "LIFT", FORCE)),
     Alteration(Scaled("lift_slope", "lift due to the angle of attack", _ALPHA, _LIFT)),
     Alteration(Scaled("side_force_slope", "side force due to the sideslip", _BETA, _SIDE)),
     Alteration(Scaled("pitch_damping", "pitching moment due to the pitch rate", _Q, _PITCH)),
@@ -98,7 +112,7 @@ ALTERATIONS = (
 # The changes that restore still air, and the filed model in it.
 STILL: Mapping[str, Any] = {"gust_rms_m_per_s": 0.0, "lateral_gust_rms_m_per_s": 0.0}
 UNALTERED: Mapping[str, Any] = {
-    **{alteration.part.name: 1.0 for alteration in ALTERATIONS},
+    **{a.part.name: a.part.neutral for a in ALTERATIONS},
     **dict.fromkeys(("mass", *INERTIAS), 1.0),
     "terms": {},
     **STILL,
@@ -114,13 +128,13 @@ class Altered(NamedTuple):
 
 
 def alterations(flight: Flight) -> list[Altered]:
-    """Return a rig's terms, and its alterations whose factors are not 1, in order.
+    """Return a rig's terms, and its alterations whose factors are not neutral, in order.
 
     A term is made at a factor of 1 as well, so that a wrong name is refused.
     """
     terms = [Altered(Term(name), factor, None) for name, factor in flight.terms.items()]
     others = [Altered(a.part, getattr(flight, a.part.name), a.about_trim) for a in ALTERATIONS]
-    return [*terms, *(each for each in others if each.factor != 1.0)]
+    return [*terms, *(each for each in others if each.factor != each.part.neutral)]
 
 
 def parts_of(main: Path) -> frozenset[str]:

@@ -25,13 +25,14 @@ from coupled.flight.everyframe import Read
 from coupled.flight.manoeuvre import Manoeuvre
 from coupled.flight.putback import tells
 from coupled.rig.parameters import Flight
+from coupled.rig.recorder import ZEROS
 
 # Models of JSBSim's package that its reset restores exactly.
 PUT_BACK_EXACTLY = frozenset({"737", "B747", "T37", "c172p", "f16"})
 # Keys of a flight section that only set its trim, or change no aircraft.
 _HARMLESS = frozenset(
     {"model", "altitude", "calibrated_airspeed", "flight_path", "direct_controls", "motion_stamp"}
-    | {"properties", "gust_length"}
+    | {"properties", "gust_length", *ZEROS.values()}
 )
 
 

@@ -1,6 +1,6 @@
 """Parts of a JSBSim model's forces and moments, each scaled by a factor k in the model's XML.
 
-The part is one of four kinds. `Scaled` is the part due to one quantity x: in each function F of an
+A part is one of five kinds. `Scaled` is the part due to one quantity x: in each function F of an
 axis it is F(x) − F(x₀), so that
 
     F ← k·F(x) + (1 − k)·F(x₀),
@@ -8,9 +8,11 @@ axis it is F(x) − F(x₀), so that
 for any form of F: a product has its coefficient scaled, a table its values less that at x₀.
 Functions outside the axis to which F refers are copied with x₀ for x. `Whole` is all functions of
 an axis, and `Term` one function by its name: F ← k·F. `Thrust` is the force and moment F of all
-engines, to which external reactions add (k − 1)·F.
+engines, to which external reactions add (k − 1)·F. `Constant` is a coefficient k that is
+added along an axis: k·q̄·S of a force, k·q̄·S·c̄ of a moment.
 
-At k = 1 the model equals the filed one to the bit. k and x₀ are properties, set after loading.
+At the neutral k (1, of a constant 0) the model equals the filed one to the bit. k and x₀ are
+properties, set after loading.
 """
 
 from __future__ import annotations
@@ -25,6 +27,8 @@ from coupled.errors import nearest
 from coupled.flight.modeltext import ModelText, axis_of, named_functions
 
 Element = ElementTree.Element
+FORCE = ("aero/qbar-psf", "metrics/Sw-sqft")  # q̄·S, lbf
+MOMENT = (*FORCE, "metrics/cbarw-ft")  # q̄·S·c̄, lbf·ft
 
 
 class NothingToScaleError(Exception):
@@ -46,6 +50,10 @@ class Part(Protocol):
     def name(self) -> str:
         """The key of its factor in a rig's `flight` section."""
 
+    @property
+    def neutral(self) -> float:
+        """The factor of the filed model."""
+
     def settings(self, factor: float) -> dict[str, float]:
         """Return the properties that scale the part, with their values for a factor."""
 
@@ -65,6 +73,7 @@ class Scaled:
     quantity: str
     properties: tuple[str, ...]
     axes: tuple[str, ...] = ()
+    neutral: float = 1.0
 
     @property
     def factor(self) -> str:
@@ -98,6 +107,7 @@ class Whole:
     name: str
     quantity: str
     axes: tuple[str, ...]
+    neutral: float = 1.0
 
     def settings(self, factor: float) -> dict[str, float]:
         """Return the property of k with its value."""
@@ -118,6 +128,7 @@ class Term:
     """One function of the aerodynamics, by its name in the model."""
 
     function: str
+    neutral: float = 1.0
 
     @property
     def name(self) -> str:
@@ -145,6 +156,7 @@ class Thrust:
     """The force and moment of all engines."""
 
     name: str = "thrust"
+    neutral: float = 1.0
 
     def settings(self, factor: float) -> dict[str, float]:
         """Return the property of k − 1 with its value."""
@@ -160,6 +172,35 @@ class Thrust:
             model.root.append(made)
         else:
             reactions[:0] = list(made)
+
+
+@dataclass(frozen=True)
+class Constant:
+    """A constant coefficient of a force or moment along an axis, which is added.
+
+    `unit` are the properties by whose product it is multiplied.
+    """
+
+    name: str
+    axis: str
+    unit: tuple[str, ...]
+    neutral: float = 0.0
+
+    def settings(self, factor: float) -> dict[str, float]:
+        """Return the property of the coefficient with its value."""
+        return {f"coupled/{self.name}/coefficient": factor}
+
+    def make_scalable(self, model: ModelText) -> None:
+        """Add a function to the axis: the coefficient times its unit."""
+        aerodynamics = model.section("aerodynamics")
+        axes = [] if aerodynamics is None else aerodynamics.findall("axis")
+        axis = next((one for one in axes if axis_of(one) == self.axis), None)
+        if aerodynamics is None or axis is None:
+            raise NothingToScaleError(self.name, f"no {self.axis} axis; leave it at 0")
+        product = ElementTree.SubElement(ElementTree.SubElement(axis, "function"), "product")
+        for name in (*self.unit, *self.settings(self.neutral)):
+            ElementTree.SubElement(product, "property").text = name
+        _declare(aerodynamics, self.settings(self.neutral))
 
 
 def _multiply(aerodynamics: Element, functions: Sequence[Element], part: Part) -> None:

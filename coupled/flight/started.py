@@ -28,7 +28,7 @@ from coupled.rig.control import ControlArray
 from coupled.rig.equations import specified_gradient
 from coupled.rig.packing import pack
 from coupled.rig.placed import Commands, Placed
-from coupled.rig.recorder import lateness, stamp
+from coupled.rig.recorder import is_exact, lateness, stamp
 
 Floats = NDArray[np.float64]
 
@@ -65,7 +65,7 @@ class StartedFlight:
         )
         self._noise = ChannelNoise(self._own_channels, rig.noise, manoeuvre.seed)
         self.data = np.zeros((0, len(self._own_channels)))
-        self._hiss = self.data if lateness(rig) else None
+        self._hiss = None if is_exact(rig) else self.data
         self._script: Floats
         self.frames: Frames
         for law in (*self._laws().values(), *self._own_pilots().values()):
@@ -182,7 +182,8 @@ class StartedFlight:
         """
         if self._hiss is None:
             return self._record(self.data[first:last].copy(), first)
-        span = 3 + math.ceil(max(abs(frames) for frames in lateness(self.manoeuvre.rig).values()))
+        late = lateness(self.manoeuvre.rig).values()
+        span = 3 + math.ceil(max((abs(frames) for frames in late), default=0.0))
         begin = max(0, first - span)
         record = self._record(self.data[begin:last].copy(), begin)
         return record.rows(first - begin, max(first, last - span) - begin)

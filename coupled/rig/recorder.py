@@ -1,4 +1,4 @@
-"""Recorder: channels of a record with late or early time stamps.
+"""Recorder: channels of a record with late or early time stamps, and with wrong zeros.
 
 A channel stamped late has earlier values; between frames they are interpolated by the cubic through
 the four nearest. The host is not affected. Before the first frame and after the last a channel is
@@ -7,16 +7,33 @@ constant.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from coupled.record.channels import ELEVATOR, PRESSURE, channel, motion_channels
 from coupled.rig.compiled import long_entry
+from coupled.rig.parameters import Flight
 from coupled.rig.rig import Rig
 
 Floats = NDArray[np.float64]
+# The channels of the motion that may read other than 0 at zero, and the fields of their readings.
+ZEROS: Mapping[str, str] = {
+    "elevator_rad": "elevator_zero",
+    "alpha_rad": "alpha_zero",
+    "sideslip_rad": "sideslip_zero",
+    "pitch_rad": "pitch_zero",
+    "load_factor": "load_factor_zero",
+    "pitch_rate_rad_per_s": "pitch_rate_zero",
+    "roll_rate_rad_per_s": "roll_rate_zero",
+    "yaw_rate_rad_per_s": "yaw_rate_zero",
+}
+
+
+def zero_of(flight: Flight, channel: str) -> float:
+    """Return the reading of a channel of the motion at zero, SI."""
+    return float(getattr(flight, ZEROS[channel])) if channel in ZEROS else 0.0
 
 
 def stamped(signal: Floats, late: float) -> Floats:
@@ -65,8 +82,20 @@ def lateness(rig: Rig) -> dict[str, float]:
     return {name: frames for name, frames in late.items() if frames != 0.0}
 
 
+def is_exact(rig: Rig) -> bool:
+    """Tell whether the recorder changes no channel."""
+    zeros = [] if rig.flight is None else [zero_of(rig.flight, name) for name in ZEROS]
+    return not any(zeros) and not lateness(rig)
+
+
 def stamp(rig: Rig, channels: Sequence[str], data: Floats, noise: Floats) -> None:
-    """Stamp a record's channels, shape (frames, channels), in place, without their noise."""
+    """Stamp a record's channels, shape (frames, channels), in place, without their noise.
+
+    The readings at zero are added.
+    """
+    for at, name in enumerate(channels if rig.flight is not None else ()):
+        assert rig.flight is not None
+        data[:, at] += zero_of(rig.flight, name)
     for name, late in lateness(rig).items():
         at = channels.index(name)
         data[:, at] = stamped(data[:, at] - noise[:, at], late) + noise[:, at]

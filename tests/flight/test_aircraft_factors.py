@@ -53,6 +53,8 @@ FLIGHTS = {
 # Any other value than the neutral one.
 OTHER = {
     **dict.fromkeys([*(a.part.name for a in ALTERATIONS), *INERTIAS, "mass"], 0.7),
+    "pitching_moment": 0.01,
+    "lift_offset": 0.01,
     "cg_aft_m": 0.1,
     "gust_rms_m_per_s": 1.0,
     "lateral_gust_rms_m_per_s": 1.0,

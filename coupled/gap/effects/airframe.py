@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from coupled.gap.effects.effect import TERMS, Drawing, Effect, Sampled, added, entry, factor, value
 from coupled.gap.signals.air import NEEDS, NEEDS_ACROSS, spread_of_air, spread_of_crossing_air
+from coupled.rig.recorder import ZEROS
 
 _ROLL, _YAW, _SLIP = "roll_rate_rad_per_s", "yaw_rate_rad_per_s", "sideslip_rad"
 TERM = "term"  # the name of an effect of a named function, in the JSON
@@ -67,8 +68,44 @@ AIRFRAME: tuple[Effect, ...] = (
         *("airframe", "center_of_gravity", ("alpha", "pitch_rate", "loop", 4.0)),
         added("aft_m", "flight.cg_aft_m", -2.0, 2.0, 0.02),
     ),
+    entry(
+        *("airframe", "pitching_moment", ("alpha", "pitch_rate", "loop", 4.0)),
+        added("coefficient", "flight.pitching_moment", -1.0, 1.0, 0.01),
+    ),
+    entry(
+        *("airframe", "lift_offset", ("alpha", "load_answer", "loop", 4.0)),
+        added("coefficient", "flight.lift_offset", -1.0, 1.0, 0.01),
+    ),
     _gust("vertical_gust", "gust_rms_m_per_s", "air", NEEDS),
     _gust("lateral_gust", "lateral_gust_rms_m_per_s", "crossing_air", NEEDS_ACROSS),
+)
+
+
+def _zero(
+    name: str, number: str, key: str, drawn: tuple[str, str], most: float, start: float
+) -> Effect:
+    """Return the effect of a sensor of the motion that reads other than 0 at zero."""
+    offset = added(number, f"flight.{key}", -most, most, start)
+    needs = (CHANNEL_OF[name],)
+    return entry("sensing", name, (*drawn, "loop", 4.0), offset, outputs=("airframe",), needs=needs)
+
+
+CHANNEL_OF = {field: channel for channel, field in ZEROS.items()}
+MOTION_ZEROS: tuple[Effect, ...] = (
+    _zero(
+        "elevator_zero", "offset_rad", "elevator_zero_rad", ("elevator", "pitch_rate"), 0.5, 0.01
+    ),
+    _zero("alpha_zero", "offset_rad", "alpha_zero_rad", ("alpha", "load_answer"), 0.5, 0.01),
+    _zero("sideslip_zero", "offset_rad", "sideslip_zero_rad", ("sideslip", "yaw_rate"), 0.5, 0.01),
+    _zero("pitch_zero", "offset_rad", "pitch_zero_rad", ("alpha", "load_answer"), 0.5, 0.01),
+    _zero("load_factor_zero", "offset", "load_factor_zero", ("alpha", "load_answer"), 2.0, 0.01),
+    *(
+        _zero(
+            *(f"{axis}_rate_zero", "offset_rad_per_s", f"{axis}_rate_zero_rad_per_s"),
+            *((x, f"{axis}_rate"), 1.0, 0.01),
+        )
+        for axis, x in (("pitch", "elevator"), ("roll", "aileron"), ("yaw", "rudder"))
+    ),
 )
 
 

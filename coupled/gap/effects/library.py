@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from coupled.gap.effects.airframe import AIRFRAME
+from coupled.gap.effects.airframe import AIRFRAME, MOTION_ZEROS
 from coupled.gap.effects.effect import (
     BY_REGRESSOR,
     EXACT,
@@ -101,6 +101,7 @@ EFFECTS: tuple[Effect, ...] = (
         added("delay_s", "flight.motion_stamp_s", -0.4, 0.4, 0.05, tolerance=CLOCK_s),
         outputs=("airframe",),
     ),
+    *MOTION_ZEROS,
     *LINKAGE,
     entry(
         *("compensation", "dropped_frames", ("", "estimate_left", "time", 0.5)),

@@ -62,9 +62,8 @@ from coupled.parallel import in_threads, in_turn
 from coupled.record.channels import LATERAL, ControlName, channel, motion_channels
 from coupled.record.record import Record
 from coupled.rig.parameters import Flight
-from coupled.rig.recorder import stamped
+from coupled.rig.recorder import ZEROS, stamped, zero_of
 from coupled.rig.rig import Rig
-from coupled.schema import changed
 from coupled.units import GRAVITY_m_per_s2
 
 RATE = "pitch_rate_rad_per_s"
@@ -185,7 +184,7 @@ class Model:
         flight, coarse = _in_time(rig), isinstance(rig, CoarseRig)
         # The air is estimated from the recorded motion, so it has the same late time stamps.
         late = rig.flight.motion_stamp * self.rig.frame_rate
-        driven, states = _digest(self.moved), self.restarts
+        driven, states, read = _digest(self.moved), self.restarts, rig.flight
 
         def plain() -> Flown | None:
             moves = late if has_gusts(flight) else 0.0
@@ -196,8 +195,9 @@ class Model:
         def restarted() -> Flown | None:
             assert states is not None
             fly = partial(self.fly, flight, self.moved, late=late, coarse=coarse)
-            asked = (coarse, late, SLOW, driven, flight)
-            return self.flights.of(asked, lambda: fly(restarts=states.at(late)))
+            zeros = {name: zero_of(read, name) for name in states.smooth}
+            asked = (coarse, late, SLOW, driven, flight, *zeros.values())
+            return self.flights.of(asked, lambda: fly(restarts=states.at(late, zeros)))
 
         if states is None or is_throttled(self.record):
             return [plain(), None]
@@ -274,9 +274,10 @@ class Model:
 
 
 def _in_time(rig: Rig) -> Flight:
-    """Return the aircraft of a rig whose motion has no late time stamps."""
+    """Return the aircraft of a rig whose motion is recorded in time and with right zeros."""
     assert rig.flight is not None
-    return changed(rig.flight, {"motion_stamp_s": 0.0}, rig.place, "flight")
+    zeros = dict.fromkeys(ZEROS.values(), 0.0)
+    return rig.flight.model_copy(update={"motion_stamp": 0.0, **zeros})
 
 
 def has_gusts(flight: Flight) -> bool:
@@ -412,7 +413,8 @@ def _output(
         made = flown(rig)
         if made is None:
             return measured + FAR * floor
-        return stamped(np.asarray(made.motion[:, column]), rig.flight.motion_stamp * rate_Hz)
+        late = rig.flight.motion_stamp * rate_Hz
+        return stamped(np.asarray(made.motion[:, column]), late) + zero_of(rig.flight, name)
 
     loose, lasts = spread(errors, own, noise.memory, rate_Hz), lasting(errors, floor)
     given = (measured, predict, floor, rate_Hz, model.number, loose, moved_by / floor)
@@ -468,8 +470,9 @@ def _trim_output(model: Model, trim: Trim) -> Output:
 
     def predict(rig: Rig) -> Floats:
         made = model.flown(rig)
-        place = trim.measured + FAR * floor if made is None else made.trim[at]
-        return np.full(len(position), place)
+        assert rig.flight is not None
+        own = None if made is None else made.trim[at] + rig.flight.elevator_zero
+        return np.full(len(position), trim.measured + FAR * floor if own is None else own)
 
     given = (trim.measured + noise, predict, floor, model.rig.frame_rate, model.number)
     return Output("airframe", TRIM, *given)

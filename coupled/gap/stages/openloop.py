@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
@@ -271,9 +272,13 @@ class Restarts:
             read["heading_rad"] = np.unwrap(read["heading_rad"])
         return cls(read, {name: smoothed(values) for name, values in read.items()}, every)
 
-    def at(self, late: float = 0.0) -> States:
-        """Return the states at the restarts; the motion is stamped so many frames `late`."""
-        return self.rows({name: stamped(x, -late) for name, x in self.smooth.items()})
+    def at(self, late: float = 0.0, zeros: Mapping[str, float] = MappingProxyType({})) -> States:
+        """Return the states at the restarts; the motion is stamped so many frames `late`.
+
+        `zeros` are readings of the sensors at zero, by channel.
+        """
+        each = ((name, stamped(x, -late)) for name, x in self.smooth.items())
+        return self.rows({name: x - zeros.get(name, 0.0) for name, x in each})
 
     def wrong(self, sample: int) -> States:
         """Return the states with a sample of their error, by its number."""

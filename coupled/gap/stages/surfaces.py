@@ -162,10 +162,11 @@ def filed_trim(rig: Rig, control: ControlName) -> float:
 def own_trim(rig: Rig, control: ControlName) -> float:
     """Return a surface's position in the trim of the rig's own aircraft, rad."""
     assert rig.flight is not None
-    still = changed(rig.flight, STILL, rig.place, "flight")
+    still = changed(rig.flight, {**STILL, "elevator_zero_rad": 0.0}, rig.place, "flight")
     controls = flown_by(rig)
     each = _trim(still.model_dump_json(), controls, rig.frame_rate, rig.place)
-    return each[controls.index(control)]
+    own = each[controls.index(control)]
+    return own + rig.flight.elevator_zero if control == "column" else own
 
 
 @lru_cache(maxsize=64)

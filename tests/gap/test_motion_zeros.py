@@ -1,0 +1,137 @@
+"""Zeros of the motion's sensors and a constant pitching moment, which imitate aerodynamic faults.
+
+The records are of bare JSBSim, and of its model edited by hand.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from coupled.flight.aircraft import make_aircraft
+from coupled.gap.checks import trimmed
+from coupled.gap.diagnose import diagnose
+from coupled.gap.findings.flown import fly_force
+from coupled.gap.stages.airframe import airframe_outputs
+from coupled.record.channels import ControlName
+from coupled.record.importing.convert import import_log
+from coupled.record.record import Record
+from coupled.resources import aircraft_folder, shipped_rigs
+from coupled.rig.recorder import ZEROS
+from coupled.rig.rig import Rig
+from coupled.rig.rigfile import read_rig
+from tests.support.ownlogs import flown
+
+# Zeros in the order of good sensors, far above the noise of a mean.
+OFF = {
+    "elevator_rad": 0.009,
+    "alpha_rad": 0.012,
+    "sideslip_rad": 0.01,
+    "pitch_rad": 0.009,
+    "load_factor": 0.01,
+    "pitch_rate_rad_per_s": 0.002,
+    "roll_rate_rad_per_s": 0.004,
+    "yaw_rate_rad_per_s": 0.002,
+}
+
+
+def alone() -> Rig:
+    return read_rig(shipped_rigs()["c172p"]).changed({"controls": {}, "noise": {}})
+
+
+def noisy(record: Record) -> Record:
+    noise = np.random.default_rng(6).normal(scale=3e-4, size=record.data.shape)
+    noise[:, 0] = 0.0
+    for name, times in {
+        "load_factor": 10.0,
+        "true_airspeed_m_per_s": 300.0,
+        "altitude_m": 1e3,
+    }.items():
+        noise[:, record.channels.index(name)] *= times
+    return Record(record.channels, record.data + noise, record.manifest)
+
+
+def offset(record: Record, name: str) -> Record:
+    data = record.data.copy()
+    data[:, record.channels.index(name)] += OFF[name]
+    return Record(record.channels, data, record.manifest)
+
+
+def gaps(rig: Rig, record: Record, zero: dict[str, float]) -> dict[str, float]:
+    """Return the gap of each output for a rig with further keys of the flight."""
+    known = trimmed(rig, {"log": record})[0]["log"]
+    outputs = airframe_outputs(known, record)
+    changes = {f"flight.{key}": value for key, value in zero.items()}
+    return {one.channel: one.gap(known.changed(changes)) for one in outputs}
+
+
+@pytest.fixture(scope="module")
+def healthy(tmp_path_factory: pytest.TempPathFactory) -> Record:
+    log, _ = flown(tmp_path_factory.mktemp("healthy"), {}, 12.0)
+    return noisy(import_log(log)[0])
+
+
+@pytest.mark.parametrize("name", OFF)
+def test_a_zero_explains_the_offset_of_its_channel(healthy: Record, name: str) -> None:
+    assert {*OFF} == {*ZEROS}
+    record = offset(healthy, name)
+    unit = name.removeprefix(ZEROS[name].removesuffix("_zero")).removeprefix("_")
+    key = f"{ZEROS[name]}_{unit}".rstrip("_")
+    assert max(gaps(alone(), record, {}).values()) > 1.3
+    assert max(gaps(alone(), record, {key: OFF[name]}).values()) < 1.2
+
+
+def test_a_constant_moment_is_that_of_the_models_own_function(tmp_path: Path) -> None:
+    log, _ = flown(tmp_path, {"/Cmo": 1.2}, 9.0)
+    record = noisy(import_log(log)[0])
+    assert max(gaps(alone(), record, {}).values()) > 2.0
+    assert max(gaps(alone(), record, {"pitching_moment": 0.02}).values()) < 1.2  # C_m0 is 0.1
+
+
+def test_a_constant_lift_is_added_along_the_lift() -> None:
+    """With C_L more the aircraft trims at less lift due to the angle of attack."""
+    names = ("aero/alpha-rad", "aero/cl-squared")
+
+    def trim(lift: float) -> list[float]:
+        rig = alone().changed({"flight.lift_offset": lift})
+        assert rig.flight is not None
+        made = make_aircraft(rig.flight, 1.0 / 120.0, ["column"], [aircraft_folder()], record=names)
+        return list(made.extra())
+
+    (alpha, squared), (less, same) = trim(0.0), trim(0.05)
+    assert same == pytest.approx(squared, rel=0.02)  # the weight is the same
+    assert 0.05 / 6.0 < alpha - less < 0.05 / 4.5  # C_Lα of the model is 5.2 to 5.5 there
+
+
+def test_a_recorder_adds_the_zeros_to_its_channels_alone() -> None:
+    rig = read_rig(shipped_rigs()["c172p"]).changed({"noise": {}})
+    force: dict[ControlName, NDArray[np.float64]] = {"column": np.full(60, 10.0)}
+    plain = fly_force(rig, force)
+    read = fly_force(rig.changed({"flight.alpha_zero_rad": 0.02}), force)
+    off = read.data - plain.data
+    at = plain.channels.index("alpha_rad")
+    assert off[:, at] == pytest.approx(0.02)
+    assert not np.delete(off, at, axis=1).any()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["alpha_rad", "load_factor", "pitch_rad", "elevator_rad"])
+def test_a_zero_of_a_sensor_is_found_as_such(healthy: Record, name: str) -> None:
+    found = diagnose(alone(), {"log": offset(healthy, name)})
+    (effect,) = found.effects
+    (number,) = effect.parameters
+    assert (found.verdict, effect.name, effect.stage) == ("effect", ZEROS[name], "sensing")
+    assert number.low is not None and number.high is not None
+    assert number.low < OFF[name] < number.high
+
+
+@pytest.mark.slow
+def test_a_wrong_elevator_moment_from_neutral_is_a_factor_and_a_constant(tmp_path: Path) -> None:
+    """The factor of the effect counts from trim; the rest is a constant pitching moment."""
+    log, _ = flown(tmp_path, {"/Cmde": 0.9}, 16.0, controls=1)
+    found = diagnose(alone(), {"log": noisy(import_log(log)[0])})
+    assert {one.name for one in found.effects} == {"elevator_effectiveness", "pitching_moment"}
+    assert found.verdict in ("effect", "mostly")
