@@ -14,7 +14,12 @@ from numpy.typing import NDArray
 from coupled.flight.aircraft import make_aircraft
 from coupled.gap.checks import trimmed
 from coupled.gap.diagnose import diagnose
+from coupled.gap.effects.effect import apply
+from coupled.gap.effects.library import BY_NAME
+from coupled.gap.findings.credibility import credibility
 from coupled.gap.findings.flown import fly_force
+from coupled.gap.search.case import Case
+from coupled.gap.search.found import Fit
 from coupled.gap.stages.airframe import airframe_outputs
 from coupled.record.channels import ControlName
 from coupled.record.importing.convert import import_log
@@ -135,3 +140,17 @@ def test_a_wrong_elevator_moment_from_neutral_is_a_factor_and_a_constant(tmp_pat
     found = diagnose(alone(), {"log": noisy(import_log(log)[0])})
     assert {one.name for one in found.effects} == {"elevator_effectiveness", "pitching_moment"}
     assert found.verdict in ("effect", "mostly")
+
+
+def test_what_remains_of_the_motion_counts_in_full_against_a_zero(healthy: Record) -> None:
+    """No function of the present signals gives the motion, so none is compared with the effect."""
+    record = offset(healthy, "alpha_rad")
+    rig = trimmed(alone(), {"log": record})[0]["log"]
+    effect = BY_NAME["alpha_zero"]
+    key, off = effect.value_key(effect.free[0]), OFF["alpha_rad"]
+    right = apply(rig, "column", [effect], {key: off})
+    fit = Fit((effect,), {key: off}, {key: off}, {key: off}, (), right, 0.0)
+    case = Case(rig, "column", airframe_outputs(rig, record))
+    found = credibility(effect, case, fit, [record], 0.9)
+    assert found.in_full
+    assert found.value < 0.2

@@ -9,7 +9,8 @@
    remains. `beside_flexible` is the share of the model's residual that adding the effect removes.
    It is small for a wrong effect, since functions of the signals remove the same. The comparison is
    omitted for effects from outside the stage, such as gusts. The motion of an aircraft is no
-   function of its present signals, so the residual of the airframe counts in full.
+   function of its present signals, so the residual of the airframe counts in full, also against a
+   sensor of its motion.
 3. Cancellation. If an output has no gap without effects, the action of a cause on this output is
    below the noise. If two effects act by more than the noise and cancel, neither is credible.
 
@@ -29,6 +30,7 @@ from numpy.typing import NDArray
 from scipy.special import stdtr, stdtrit
 
 from coupled.gap.chain import BY_NAME as STAGE_OF
+from coupled.gap.chain import stage_of
 from coupled.gap.effects.effect import Effect
 from coupled.gap.findings.where import free_share, response, signals
 from coupled.gap.noise.smooth import smoothed
@@ -267,7 +269,7 @@ def credibility(
         return replace(plain, exact=True)
     if remains < FEW or not acts or effect.signature.drawing == "time":
         return plain
-    if STAGE_OF[effect.stage].flown:
+    if all(STAGE_OF[stage_of(output)].flown for output in effect.shows_in):
         return replace(plain, in_full=True)
     most = max(acts, key=lambda one: float(one.action @ one.action))
     return replace(plain, beside_flexible=_beside_flexible(case, found, most))
