@@ -73,11 +73,12 @@ _NAMED: Final[dict[str, Unit]] = {
         _NONE: {"1": 1.0, "%": 0.01},
         _FORCE: {
             **{"N": 1.0, "daN": 10.0, "kN": 1e3},
-            **{"lbf": POUND_N, "lb": POUND_N, "ozf": POUND_N / 16.0},
+            **{"lbf": POUND_N, "lb": POUND_N, "lbs": POUND_N, "ozf": POUND_N / 16.0},
             **{"kgf": GRAVITY_m_per_s2, "kp": GRAVITY_m_per_s2, "mN": 1e-3},
         },
         _TORQUE: {
-            **{"Nm": 1.0, "mNm": 1e-3, "Ncm": 0.01, "kNm": 1e3, "kgfcm": 0.01 * GRAVITY_m_per_s2},
+            **{"Nm": 1.0, "mNm": 1e-3, "Ncm": 0.01, "daNm": 10.0, "kNm": 1e3},
+            **{"kgfcm": 0.01 * GRAVITY_m_per_s2, "kgfm": GRAVITY_m_per_s2, "kpm": GRAVITY_m_per_s2},
             **{
                 "ftlbf": POUND_N * FOOT_m,
                 "inlbf": POUND_N * INCH_m,
@@ -113,6 +114,20 @@ _QUOTIENTS: Final = (
 )
 _FACTOR: Final = re.compile(r"([A-Za-z]+|1|%)(?:\^?([23]))?")
 
+# Usual spellings of units, in words, and their symbols in this package.
+SPELLINGS: Final[dict[str, str]] = {
+    **{"lbf": "lbf", "kgf": "kgf", "n": "N", "m": "m", "um": "um", "mm": "mm", "cm": "cm"},
+    **{"in": "in", "ft": "ft", "rad": "rad", "mrad": "mrad", "deg": "deg", "pa": "Pa"},
+    **{"kpa": "kPa", "hpa": "hPa", "psf": "psf", "psi": "psi", "mbar": "mbar", "kt": "kt"},
+    **{"mph": "mph", "s": "s", "ms": "ms", "us": "us", "ns": "ns", "g": "g"},
+    **{"lb": "lbf", "lbs": "lbf", "dan": "daN", "kts": "kt", "knots": "kt", "inch": "in"},
+    **{"inches": "in", "degree": "deg", "degrees": "deg", "newton": "N", "sec": "s", "pct": "%"},
+    **{"feet": "ft", "metres": "m", "meters": "m", "kn": "kN"},
+    **{"deg s": "deg/s", "rad s": "rad/s", "m s": "m/s", "ft s": "ft/s", "mps": "m/s"},
+    **{"deg per s": "deg/s", "rad per s": "rad/s", "m per s": "m/s", "ft per s": "ft/s"},
+    **{"dps": "deg/s", "km h": "km/h"},
+}
+
 _TIMES: Final = re.compile(r"(?<=[A-Za-z])(?: *[·⋅*.-] *| +)(?=[A-Za-z])")
 
 
@@ -139,6 +154,16 @@ def parse_unit(text: str) -> Unit | None:
         a, b, c, d = (x + power * y for x, y in zip(dimension, named.dimension, strict=True))
         dimension = (a, b, c, d)
     return Unit(factor, dimension)
+
+
+def usual_unit(text: str) -> str:
+    """Return the unit that a log's text means, in this package's symbol; "" if it is unknown.
+
+    `LBF`, `Inches` and `sec` are read as well: a log's units come in any case, a map's do not.
+    """
+    if parse_unit(text) is not None:
+        return text
+    return SPELLINGS.get(" ".join(re.findall("[^\\W_]+", text.lower())), "")
 
 
 def units_like(unit: Unit) -> list[str]:

@@ -32,7 +32,7 @@ from coupled.record.importing.several import clock_of, lay_grids, log_of, read_l
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
 from coupled.schema import LARGEST, SMALLEST
-from coupled.units import parse_unit
+from coupled.units import parse_unit, usual_unit
 
 Floats = NDArray[np.float64]
 
@@ -146,7 +146,7 @@ def _in_si(log: Log, name: str, channel: Channel, map_file: Path, warnings: list
         raise InputError(map_file, f"{key}.unit", "is missing; the log states none")
     given = channel.unit or stated
     factor = 1.0 if channel.own else factor_of(name, given, map_file, channel.radius)
-    if channel.unit and stated and parse_unit(stated) != parse_unit(channel.unit):
+    if channel.unit and stated and parse_unit(usual_unit(stated)) != parse_unit(channel.unit):
         warnings.append(f"{name}: the map says {channel.unit}, the log itself {stated}")
     si = channel.sign * factor * (channel.scale * values + channel.offset)
     huge = np.abs(si) > LARGEST

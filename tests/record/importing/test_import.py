@@ -65,7 +65,8 @@ def test_a_unit_of_another_dimension_is_refused(channel: str, name: str) -> None
         *[("kt", 0.514444444), ("km/h", 0.2777777778), ("ft/s", 0.3048), ("fpm", 0.00508)],
         *[("deg", 0.01745329252), ("[°/s]", 0.01745329252), ("m/s²", 1.0), ("m/s/s", 1.0)],
         *[("lbf/ft^2", 47.88025898), ("N/mm", 1000.0), ("lbf / deg", 254.8643249), ("%", 0.01)],
-        ("d", 86_400.0),
+        *[("d", 86_400.0), ("lbs", 4.4482216152605), ("daNm", 10.0), ("kpm", 9.80665)],
+        *[("kgfm", 9.80665), ("lbf.in", 0.112984829)],
     ],
 )
 def test_units_have_their_published_factors(name: str, factor: float) -> None:

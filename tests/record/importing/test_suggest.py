@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from coupled.record.importing.suggest.names import read_name
 from coupled.record.importing.suggest.propose import Proposal, propose
 from coupled.resources import shipped_rigs
 from coupled.rig.rigfile import read_rig
+from coupled.units import POUND_N
 from tests.support.commands import coupled, files
 from tests.support.logs import FORCE_N, GOOD, DEFLECTION_m, TIME_s
 
@@ -351,3 +353,49 @@ def test_further_rows_of_the_header_are_left_out(
     (tmp_path / "map.toml").write_text(proposal.text)
     record, _ = import_log(tmp_path / "log.csv", tmp_path / "map.toml")
     np.testing.assert_allclose(record["column_force_N"], FORCE_N, atol=1e-6)
+
+
+@pytest.mark.parametrize("remark", ["", "Remark: bench 3, run 7\n"])
+@pytest.mark.parametrize("case", [str.upper, str.lower])
+def test_units_below_the_header_are_used_in_any_case_and_below_a_remark(
+    tmp_path: Path, remark: str, case: Callable[[str], str]
+) -> None:
+    """Of 0.6 mm of travel the size alone would make inches."""
+    numbers = np.column_stack([TIME_s, FORCE_N / POUND_N, 6e-4 * np.sin(TIME_s) * 1e3])
+    rows = [",".join(f"{cell:.9f}" for cell in row) for row in numbers]
+    head = f"Time,Stick load,Grip travel\n{remark}{case('s,lbf,mm')}"
+    (tmp_path / "log.csv").write_text("\n".join([head, *rows, ""]))
+    proposal, table = proposed(tmp_path / "log.csv")
+    units = {name: channel["unit"] for name, channel in table["channels"].items()}
+    assert units == {"column_force_N": "lbf", "column_deflection_m": "mm"}
+    (tmp_path / "map.toml").write_text(proposal.text)
+    record, account = import_log(tmp_path / "log.csv", tmp_path / "map.toml")
+    np.testing.assert_allclose(record["column_force_N"], FORCE_N, atol=1e-6)
+    assert not [line for line in account.warnings if "the log itself" in line]
+
+
+@pytest.mark.parametrize(
+    ("name", "stated", "says"),
+    [
+        ("Grip", "V", "the log states 'V', no known unit: m or mm"),
+        ("Grip", "Zoll", "the log states 'Zoll', no known unit: m or mm"),
+        ("Grip_mm", "m", "the log states 'm', the name mm"),
+        ("Grip_mm", "mm", ""),
+        ("Grip_mm", "V", ""),
+        ("Grip", "-", ""),
+    ],
+)
+def test_a_unit_that_the_log_leaves_open_is_asked_and_not_guessed_from_the_size(
+    tmp_path: Path, name: str, stated: str, says: str
+) -> None:
+    numbers = np.column_stack([TIME_s, FORCE_N, 0.3 * np.sin(TIME_s)])
+    rows = [",".join(f"{cell:.9f}" for cell in row) for row in numbers]
+    (tmp_path / "log.csv").write_text("\n".join([f"Time,Load,{name}", f"s,N,{stated}", *rows, ""]))
+    questions = [each for each in proposed(tmp_path / "log.csv")[0].questions if ".unit" in each]
+    assert [says in each for each in questions] == ([True] if says else [])
+
+
+def test_a_force_in_a_unit_of_torque_is_left_out_with_what_it_needs(tmp_path: Path) -> None:
+    table = {"t [s]": TIME_s, "Stick load [daNm]": FORCE_N, "Grip [m]": DEFLECTION_m}
+    pl.DataFrame(table).write_csv(tmp_path / "log.csv")
+    assert "# Stick load [daNm]  (a torque: with its unit" in proposed(tmp_path / "log.csv")[0].text

@@ -12,16 +12,18 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from coupled.errors import InputError
+from coupled.errors import InputError, shown
 from coupled.record.importing.cells import lists_in
 from coupled.record.importing.mapping import Stamped
 from coupled.record.importing.reading import LATEST_ns, Log
 from coupled.record.importing.suggest.dates import CLOCK, read_dates
-from coupled.record.importing.suggest.dialect import is_number
+from coupled.record.importing.suggest.dialect import is_number, units_in
 from coupled.record.importing.suggest.names import Reading, read_name
 from coupled.record.importing.suggest.sizes import forward_steps, sentinels
+from coupled.units import parse_unit, usual_unit
 
 Floats = NDArray[np.float64]
+MOST_HEADS = 10  # rows between the header and the numbers
 FEW = 0.1  # share of a column's cells that may be empty or not numbers
 
 
@@ -32,7 +34,7 @@ class Column:
     `values` are its numbers, NaN if empty, shape (rows,); for a column of lists, their first
     elements, and `length` is the number of elements. Dates are in s from the first, in the pattern
     `date`, which is "?" if it is unknown. The rows `untimed`, above the first and below the last
-    time, are left out.
+    time, are left out. `doubt` is the reason why the log's own text does not determine the unit.
     """
 
     log: str
@@ -43,6 +45,7 @@ class Column:
     length: int = 0
     date: str = ""
     untimed: tuple[str, ...] = ()
+    doubt: str = ""
 
     @property
     def moves(self) -> bool:
@@ -63,7 +66,8 @@ class Column:
 
 def columns_of(log: Log) -> list[Column]:
     """Return a log's columns in their order, including those without numbers."""
-    columns = [_column(log, name) for name in log.columns]
+    units = {**_units_above(log), **log.units}
+    columns = [_column(log, name, units.get(name, "")) for name in log.columns]
     clock = next((c for c in columns if c.is_clock and c.moves), None)
     if clock is None:
         return columns
@@ -85,11 +89,38 @@ def _lines(log: Log, first: int, end: int) -> list[str]:
     return ["-".join(dict.fromkeys(str(log.line(row)) for row in (first, end - 1)))]
 
 
-def _column(log: Log, name: str) -> Column:
-    cells = log.columns[name]
-    unit = log.units.get(name, "")
+def _units_above(log: Log) -> dict[str, str]:
+    """Return the cells of the row with most units between header and numbers, by column."""
+    cells = {name: each for name, each in log.columns.items() if each.dtype == pl.String}
+    found: dict[str, str] = {}
+    for row in range(min([MOST_HEADS, *(each.len() for each in cells.values())])):
+        words = {name: str(each[row] or "") for name, each in cells.items()}
+        if any(map(is_number, words.values())):
+            break
+        if units_in(words.values()) > units_in(found.values()):
+            found = words
+    return found
+
+
+def _column(log: Log, name: str, unit: str) -> Column:
     own = next((plain for plain, each in log.doubled.items() if name in each), name)
-    reading = read_name(own, unit, log.file.stem)
+    column = _read(log, name, read_name(own, unit, log.file.stem))
+    return replace(column, doubt=_doubt(unit, read_name(own).unit))
+
+
+def _doubt(stated: str, named: str) -> str:
+    """Return why the unit that a log states is unclear, beside the one in the column's name."""
+    known, other = parse_unit(usual_unit(stated)), parse_unit(named)
+    if known is None:
+        unknown = bool(re.search("[^\\W\\d_]", stated)) and not named
+        return f"the log states {shown(stated, 40)!r}, no known unit" if unknown else ""
+    if other is None or other.dimension != known.dimension or other == known:
+        return ""
+    return f"the log states {shown(stated, 40)!r}, the name {named}"
+
+
+def _read(log: Log, name: str, reading: Reading) -> Column:
+    cells = log.columns[name]
     if cells.dtype == pl.String:
         there = cells.drop_nulls()  # in the middle: the first may be a further row of the header
         text = str(there[there.len() // 2]) if there.len() else ""

@@ -6,7 +6,7 @@ import csv
 import re
 from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from itertools import chain
 from pathlib import Path
 from typing import Literal
@@ -15,7 +15,7 @@ from coupled.errors import InputError
 from coupled.files import read_bytes
 from coupled.record.importing.mapping import Layout
 from coupled.record.importing.reading import FORMATS, text_of
-from coupled.units import parse_unit
+from coupled.units import usual_unit
 
 LOOKED_AT = 400  # lines from which the layout is guessed
 COMMENTS = ("#", "%", "//", "*")
@@ -47,7 +47,7 @@ def guess_layout(path: Path) -> Layout:
     skipped = rows[first][0] if not comment else _skipped(rows[first][0], lines, comment)
     cells = cells[first:]
     header = not all(is_number(cell) or not cell or _STAMP.match(cell) for cell in cells[0])
-    units_row = header and _holds_units(cells[1]) and any(map(is_number, chain(*cells[2:5])))
+    units_row = header and units_in(cells[1]) > 0 and any(map(is_number, chain(*cells[2:5])))
     below = cells[(2 if units_row else 1) if header else 0 :]
     numbers = (i for i, row in enumerate(below) if any(map(is_number, row)))
     below = below[next(numbers, 0) :]  # without further rows of the header
@@ -112,10 +112,12 @@ def _skipped(row: int, lines: Sequence[str], comment: str) -> int:
     return row if others else 0
 
 
-def _holds_units(row: Sequence[str]) -> bool:
+def units_in(row: Iterable[str]) -> int:
+    """Return the number of units in a row; 0 if it has numbers."""
     words = [cell for cell in row if cell]
-    known = [cell for cell in words if parse_unit(cell) is not None and not is_number(cell)]
-    return bool(known) and not any(is_number(cell) and cell != "1" for cell in words)
+    if any(is_number(cell) and cell != "1" for cell in words):
+        return 0
+    return sum(bool(usual_unit(cell)) and not is_number(cell) for cell in words)
 
 
 def _missing(rows: Sequence[Sequence[str]], width: int) -> list[str]:

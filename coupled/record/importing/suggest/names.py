@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from coupled.record.channels import ControlName, channel
 from coupled.record.importing.mapping import CHANNELS, own_unit
-from coupled.units import parse_unit
+from coupled.units import SPELLINGS, parse_unit, usual_unit
 
 
 def _set(text: str) -> frozenset[str]:
@@ -68,21 +68,6 @@ UMLAUTS = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss"})
 COMPUTER = _set(
     "cpu cpuload gpu ram memory mem bus network net disk battery thread task process queue"
 )
-# Usual spellings of units at the end of a name, and their symbols in this package.
-SUFFIXES = {
-    **{
-        word: word
-        for word in sorted(_set("lbf kgf N m um mm cm in ft rad mrad deg Pa kPa hPa psf psi"))
-    },
-    **{word: word for word in sorted(_set("mbar kt mph s ms us ns g"))},
-    **{"lb": "lbf", "lbs": "lbf", "dan": "daN", "kts": "kt", "knots": "kt", "inch": "in"},
-    **{"inches": "in", "degree": "deg", "degrees": "deg", "newton": "N", "sec": "s", "pct": "%"},
-    **{"feet": "ft", "metres": "m", "meters": "m", "kn": "kN"},
-    **{"deg s": "deg/s", "rad s": "rad/s", "m s": "m/s", "ft s": "ft/s", "mps": "m/s"},
-    **{"deg per s": "deg/s", "rad per s": "rad/s", "m per s": "m/s", "ft per s": "ft/s"},
-    **{"dps": "deg/s", "km h": "km/h"},
-}
-_LOWER = {key.lower(): unit for key, unit in SUFFIXES.items()}
 # A symbol with a prefix, as in `F_kN`, whose capital begins no word of its own.
 _PREFIXED = re.compile(r"(?<![A-Za-z])([a-z]{1,2}(?:N|Pa|Nm))\W*$")
 
@@ -113,9 +98,9 @@ def words_of(name: str) -> list[str]:
 def read_name(name: str, listed_unit: str = "", log: str = "") -> Reading:
     """Return the reading of a column's name, with the log's unit and the log's own name."""
     if name in CHANNELS:
-        return Reading(name, listed_unit or own_unit(name))
+        return Reading(name, usual_unit(listed_unit) or own_unit(name))
     stem, unit = _unit(name)
-    unit = listed_unit if parse_unit(listed_unit) is not None else unit
+    unit = usual_unit(listed_unit) or unit
     words = words_of(stem)
     timed = _is(unit, "s")
     if set(words) & {*TIME, "t"} and "rate" not in words and (timed or not unit):
@@ -144,8 +129,8 @@ def _unit(name: str) -> tuple[str, str]:
     words = words_of(name)
     for count in (3, 2, 1):
         last = " ".join(words[-count:])
-        if len(words) > count and last in _LOWER:
-            return " ".join(words[:-count]), _LOWER[last]
+        if len(words) > count and last in SPELLINGS:
+            return " ".join(words[:-count]), SPELLINGS[last]
     return name, ""
 
 

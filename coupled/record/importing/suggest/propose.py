@@ -7,7 +7,7 @@ refused until the user has answered all. Signs of loads and scales of counts are
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -103,7 +103,8 @@ def propose(files: Sequence[Path], rig: Rig | None = None) -> Proposal:
     warnings = [note for log in read for note in log.notes]
     refused = [each for log in read for each in log.refused.items()]
     warnings += [f"{name}: {why}" for name, why in refused if why != TEXT]
-    text = _text(sections, logs, unmapped)
+    arms = {_named(column, logs) for column in left if _is_torque(column)}
+    text = _text(sections, logs, unmapped, arms)
     return Proposal(text, questions, mapped, unmapped, tuple(dict.fromkeys(warnings)))
 
 
@@ -199,6 +200,9 @@ def _clock(columns: Sequence[Column], log: str, several: bool, main: bool) -> li
         remark = 'in which pattern? as "%d.%m.%Y %H:%M:%S.%f"' if column.date == "?" else ""
         lines.append(("date", column.date, remark))
         fit = [] if remark else fit
+    elif column.kind != "dates" and column.doubt:
+        lines.append(("unit", "?", column.doubt))
+        fit = []
     elif column.kind != "dates" and column.reading.unit:
         lines.append(("unit", column.reading.unit, "by its name"))
     elif column.kind != "dates":
@@ -275,7 +279,10 @@ def _channel_lines(
     elif magnitude and "force" in channel:
         lines.append(("sign", "?", "never negative: 1 or -1, if the hand only pulled; a size"))
     unit = column.reading.unit
-    if unit:
+    if column.doubt:
+        known = " or ".join(units_like(_own(channel))[:4])
+        lines.append(("unit", "?", f"{column.doubt}: {known}? else give scale and offset too"))
+    elif unit:
         lines.append(("unit", unit, ""))
     elif sizes.are_counts(column.values):
         known = " or ".join(units_like(_own(channel))[:4])
@@ -288,7 +295,11 @@ def _channel_lines(
 
 
 def _own(channel: str) -> Unit:
-    unit = parse_unit(own_unit(channel))
+    return _unit_of(own_unit(channel))
+
+
+def _unit_of(text: str) -> Unit:
+    unit = parse_unit(text)
     assert unit is not None
     return unit
 
@@ -325,7 +336,10 @@ def _signs(
 
 
 def _text(
-    sections: Sequence[tuple[str, list[Line]]], logs: Sequence[str], unmapped: Sequence[str]
+    sections: Sequence[tuple[str, list[Line]]],
+    logs: Sequence[str],
+    unmapped: Sequence[str],
+    torques: Collection[str],
 ) -> str:
     rows = [
         f"# A map for {', '.join(logs)}, proposed from names, units and sizes. Read it through:",
@@ -339,14 +353,16 @@ def _text(
             text = json.dumps(value, ensure_ascii=False)
             rows.append(f"{key} = {text}" + (f"  # {remark}" if remark else ""))
     if unmapped:
-        rows += ["", "# Not used:", *(_left(name) for name in unmapped)]
+        rows += ["", "# Not used:", *(_left(name, name in torques) for name in unmapped)]
     return "\n".join(rows) + "\n"
 
 
-def _left(name: str) -> str:
-    arm = (
-        "  (a torque: with its unit and radius_m, it is a force)"
-        if is_torque(words_of(name))
-        else ""
-    )
+def _is_torque(column: Column) -> bool:
+    unit = parse_unit(column.reading.unit)
+    own = unit is not None and unit.dimension == _unit_of("Nm").dimension
+    return own or is_torque(words_of(column.name))
+
+
+def _left(name: str, torque: bool) -> str:
+    arm = "  (a torque: with its unit and radius_m, it is a force)" if torque else ""
     return f"# {json.dumps(name, ensure_ascii=False)[1:-1]}{arm}"
