@@ -280,6 +280,13 @@ def two_places(first: str, second: str, yields_m_per_N: float) -> dict[str, np.n
         (("Grip LVDT [m]", "Act pos [m]"), 0.0, "Act pos [m]", False),
         (("Encoder [m]", "Grip [m]"), 1e-4, "Encoder [m]", False),
         (("Encoder [m]", "Grip [m]"), -1e-4, "", True),
+        (("Act pos [m]", "Grip LVDT [m]"), -1e-4, "", True),
+        (("Motor pos [m]", "Handle pos [m]"), -1e-4, "", True),
+        (("LVDT1 [m]", "LVDT2 [m]"), 1e-4, "LVDT1 [m]", False),
+        (("LVDT1 [m]", "LVDT2 [m]"), -1e-4, "LVDT2 [m]", False),
+        (("LVDT1 [m]", "LVDT2 [m]"), 0.0, "", True),
+        (("Handle encoder [m]", "Motor encoder [m]"), 0.0, "Motor encoder [m]", False),
+        (("stick pos [m]", "stick pos demand [m]"), 0.0, "stick pos demand [m]", False),
     ],
 )
 def test_two_places_are_told_apart_by_name_or_by_force_or_asked(

@@ -1,7 +1,7 @@
 """Which of two positions is the grip's and which the computed one, if names do not decide it.
 
-A structure bends under a force: δ − δc = K·F, K > 0. This decides if names do not. If the numbers
-contradict a name, or show nothing, the proposal has a question.
+A structure bends under a force: δ − δc = K·F, K > 0. This decides if neither name does. If the
+numbers contradict a name, or show nothing, the proposal has a question.
 """
 
 from __future__ import annotations
@@ -37,11 +37,11 @@ def settle_ends(chosen: Mapping[str, Column]) -> tuple[dict[str, Column], dict[s
             asked[name] = f"{column!r}, if this is its end; else call the section channels.{other}"
             continue
         computed, deflection = (settled[name] for name in ends)
-        unsure = computed.reading.either_end or deflection.reading.either_end
+        named = _named(computed, deflection)
         sign = _yields(computed, deflection, settled.get(channel(control, "force")))
-        if sign < 0 and unsure:
+        if sign < 0 and not named:
             settled[ends[0]], settled[ends[1]] = deflection, computed
-        elif sign < 0 or (sign == 0 and unsure and not _named(computed, deflection)):
+        elif sign < 0 or (sign == 0 and not named):
             says = "its name contradicts the force" if sign else "the names do not show it"
             both = f"{computed.name!r} or {deflection.name!r}"
             asked[ends[0]] = f"{both}: which is on the actuator's side? {says}"

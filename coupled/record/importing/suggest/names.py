@@ -28,11 +28,13 @@ CONTROLS: dict[ControlName, frozenset[str]] = {
 }
 # Words of a setpoint: a force column with one of them is proposed only if there is no other.
 COMMANDS = _set("cmd command commanded target setpoint ref soll")
+COMMANDS |= _set("demand demanded desired reference")
 QUANTITIES = {
     "modifying_force": _set("fmod modifying"),
     "force": _set("force frc f load loadcell lc pull gauge newton lbf kraft"),
     "computed": _set("computed servo actuator control stell aktor antrieb") | COMMANDS,
-    "deflection": _set("deflection defl grip hand true actual measured state sensor griff ist"),
+    "deflection": _set("deflection defl grip hand handle true actual measured state sensor")
+    | _set("griff ist"),
 }
 # Words for transducers of position, which identify the end only if no other word does.
 DEVICES = {"computed": _set("encoder enc pot lvdt"), "deflection": _set("laser")}
@@ -78,7 +80,7 @@ class Reading:
 
     `sure` is false if the control or the meaning is ambiguous, as that of a time which has only
     the unit of one; `either_end`: it is a position of the grip or the computed one. `commanded`: a
-    force with a word of a setpoint.
+    force with a word of a setpoint; `by_device`: only a transducer's name identifies the end.
     """
 
     channel: str
@@ -86,6 +88,7 @@ class Reading:
     sure: bool = True
     either_end: bool = False
     commanded: bool = False
+    by_device: bool = False
 
 
 def words_of(name: str) -> list[str]:
@@ -146,7 +149,9 @@ def _moved(words: list[str], unit: str, log_words: list[str]) -> Reading | None:
     if present & COMPUTER or (is_torque(words) and not _is(unit, "N")):
         return None
     quantities = [quantity for quantity, names in QUANTITIES.items() if present & names]
+    by_device = not quantities
     quantities = quantities or [q for q, names in DEVICES.items() if present & names]
+    by_device &= bool(quantities)
     either = False
     if not quantities and present & PLACES:
         quantities = [q for q in ENDS if set(log_words) & QUANTITIES[q]]
@@ -163,7 +168,7 @@ def _moved(words: list[str], unit: str, log_words: list[str]) -> Reading | None:
     control: ControlName = controls[0] if controls else "column"
     commanded = "force" in quantities[0] and bool(present & COMMANDS)
     sure = len(controls) == 1 and not either and not commanded
-    return Reading(channel(control, quantities[0]), unit, sure, either, commanded)
+    return Reading(channel(control, quantities[0]), unit, sure, either, commanded, by_device)
 
 
 def is_torque(words: list[str]) -> bool:

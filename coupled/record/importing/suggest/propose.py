@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -230,10 +230,10 @@ def _chosen(columns: Sequence[Column]) -> dict[str, Column]:
     """Return the column of each channel; of several, the first with a certain name, or the first.
 
     A switch, a constant and a commanded force come last. A position of either end is the computed
-    one if the grip has its own.
+    one if the grip has its own. Two transducers of one control may each be at either end.
     """
     chosen: dict[str, Column] = {}
-    for column in sorted(columns, key=_rank):
+    for column in sorted(_with_open_ends(columns), key=_rank):
         channel, unit = column.reading.channel, column.reading.unit
         if not channel or column.kind in ("text", "dates") or not _fits(unit, channel):
             continue
@@ -241,6 +241,19 @@ def _chosen(columns: Sequence[Column]) -> dict[str, Column]:
             channel = channel.replace("_deflection_", "_computed_")
         chosen.setdefault(channel, column)
     return chosen
+
+
+def _with_open_ends(columns: Sequence[Column]) -> list[Column]:
+    """Return the columns, at an open end where two have only a transducer's name for the same."""
+    devices = [c.reading.channel for c in columns if c.reading.by_device and c.kind == "numbers"]
+    found = []
+    for column in columns:
+        read = column.reading
+        if read.by_device and devices.count(read.channel) > 1:
+            end = read.channel.replace("_computed_", "_deflection_")
+            read = replace(read, channel=end, either_end=True, sure=False)
+        found.append(replace(column, reading=read))
+    return found
 
 
 def _rank(column: Column) -> tuple[bool, bool, bool, bool]:
