@@ -75,10 +75,18 @@ def check_order(log: Log, time_s: Floats, clock: Stamped, key: str) -> None:
         problem += f" a stale one of an earlier run is: {key}.drop_rows = [{line}] leaves it out"
         raise InputError(log.file, clock.source, problem)
     back_s = f"time goes back from {time_s[row]:.6f} to {time_s[row + 1]:.6f} s"
-    remedies = [] if clock.sort else ["sort = true for rows out of order"]
+    ahead = np.flatnonzero(time_s[row + 1 :] > time_s[row])
+    last = row + int(ahead[0]) if ahead.size else time_s.size - 1
+    dropped = f"[{line}] for a wrong stamp"
+    if last > row + 1:
+        until = "until it goes on" if ahead.size else "of the other run or clock"
+        dropped = f'["{line}-{log.line(last)}"] for the rows {until}'
+    # Without a later row of the first run, sorted rows would have a gap, or mix two runs.
+    set_back = back.size == 1 and not ahead.size and last > row + 1
+    remedies = [] if clock.sort or set_back else ["sort = true for rows out of order"]
     if not clock.date:
         remedies.append("wraps_at = N for a counter that starts again after N")
-    remedies.append(f"drop_rows = [{line}] for a wrong stamp")
+    remedies.append(f"drop_rows = {dropped}")
     problem = f"row {line}: {back_s} after the first row; {key} may have {', or '.join(remedies)}"
     raise InputError(log.file, clock.source, problem)
 

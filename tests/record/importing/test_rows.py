@@ -29,6 +29,27 @@ def test_a_stale_first_stamp_is_named_as_one(tmp_path: Path) -> None:
         np.testing.assert_allclose(rows(tmp_path, log, "drop_rows = [2]"), FORCE_N[1:], rtol=1e-9)
 
 
+@pytest.mark.parametrize(("first", "last"), [(301, 600), (301, 320)])
+def test_rows_of_a_clock_set_back_are_named_by_a_range_that_leaves_them_out(
+    tmp_path: Path, first: int, last: int
+) -> None:
+    back = [
+        f"{float(time) - 20_000.0:.6f},{rest}" if first <= row <= last else f"{time},{rest}"
+        for row, (time, _, rest) in enumerate(line.partition(",") for line in LINES)
+        if row
+    ]
+    log = "\n".join([LINES[0], *back])
+    span = f'["{first + 1}-{last + 1}"]'
+    with pytest.raises(InputError) as refused:
+        imported(tmp_path, log)
+    assert f"row {first + 1}: time goes back" in str(refused.value)
+    assert f"drop_rows = {span}" in str(refused.value)
+    assert ("sort = true" in str(refused.value)) == (last < 600)
+    if last == 600:
+        found = rows(tmp_path, log, f"drop_rows = {span}")
+        np.testing.assert_allclose(found, FORCE_N[: first - 1], rtol=1e-9)
+
+
 def test_rows_that_came_late_are_put_back(tmp_path: Path) -> None:
     late = [*LINES[:50], *LINES[51:55], LINES[50], *LINES[55:]]
     with pytest.raises(InputError, match=r"row 55: time goes back .* sort = true"):
