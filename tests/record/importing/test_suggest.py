@@ -220,6 +220,14 @@ def test_a_file_that_is_not_a_log_is_refused(tmp_path: Path) -> None:
             propose([tmp_path / "log.csv"])
 
 
+def test_without_a_header_a_column_that_rises_evenly_may_be_the_time(tmp_path: Path) -> None:
+    rows = zip(1e3 * TIME_s, FORCE_N, DEFLECTION_m, strict=True)
+    (tmp_path / "log.txt").write_text("\n".join("  ".join(map(str, row)) for row in rows))
+    proposal, table = proposed(tmp_path / "log.txt")
+    assert table["clock"] == {"from": "?", "unit": "ms"}
+    assert proposal.questions[0].startswith('clock.from: "1" rises evenly')
+
+
 @pytest.mark.parametrize("name", ["log.csv", "log.mat"])
 def test_where_no_name_says_anything_all_is_asked(tmp_path: Path, name: str) -> None:
     """A file without a header, and a MATLAB file of a, b and c."""

@@ -19,7 +19,7 @@ from coupled.record.importing.reading import LATEST_ns, Log
 from coupled.record.importing.suggest.dates import CLOCK, read_dates
 from coupled.record.importing.suggest.dialect import is_number, units_in
 from coupled.record.importing.suggest.names import Reading, read_name
-from coupled.record.importing.suggest.sizes import forward_steps, sentinels
+from coupled.record.importing.suggest.sizes import USUAL, forward_steps, sentinels
 from coupled.units import parse_unit, usual_unit
 
 Floats = NDArray[np.float64]
@@ -52,6 +52,14 @@ class Column:
         """Whether it is not constant."""
         there = self.values[np.isfinite(self.values)]
         return there.size > 1 and bool(there.max() > there.min())
+
+    @property
+    def rises(self) -> bool:
+        """Whether it is a column of numbers that rise by a usual step from row to row."""
+        steps = np.diff(self.values)
+        if self.kind != "numbers" or steps.size < 2 or not np.all(steps > 0.0):
+            return False
+        return bool(np.all(np.abs(steps / np.median(steps) - 1.0) < USUAL))
 
     @property
     def is_clock(self) -> bool:

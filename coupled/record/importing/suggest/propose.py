@@ -78,7 +78,7 @@ def propose(files: Sequence[Path], rig: Rig | None = None) -> Proposal:
     logs = [file.name for file in files]
     chosen = _chosen([c for c in columns if c.reading.channel != "time"])
     chosen, asked = settle_ends(chosen)
-    clock, clocks = _clocks(_stamps_first(columns, read, chosen), logs)
+    clock, clocks = _clocks(_stamps_first(columns, read, chosen), columns, logs)
     sections = [("log", _layout_lines(layout, far)), ("clock", clock)]
     sections += [(f"clocks.{toml_string(name)}", lines) for name, lines in clocks.items()]
     for channel in CHANNELS:
@@ -175,10 +175,18 @@ def _layout_lines(layout: Layout, far: Sequence[str]) -> list[Line]:
 
 
 def _clocks(
-    columns: Sequence[Column], logs: Sequence[str]
+    stamps: Sequence[Column], columns: Sequence[Column], logs: Sequence[str]
 ) -> tuple[list[Line], dict[str, list[Line]]]:
     """Return the lines of `[clock]`, and those of logs with other stamps."""
-    found = {name: _clock(columns, name, len(logs) > 1, main=name == logs[0]) for name in logs}
+    found = {}
+    for name in logs:
+        column = next((each for each in stamps if each.log == name), None)
+        rising = [each for each in columns if each.log == name and each.rises]
+        found[name] = (
+            _no_clock(rising, len(logs) > 1)
+            if column is None
+            else _clock(column, main=name == logs[0])
+        )
     first = found[logs[0]]
     plain = [line for line in first if line[0] != "frame_rate_Hz"]
     return first, {name: found[name] for name in logs[1:] if not _alike(found[name], plain)}
@@ -188,12 +196,26 @@ def _alike(lines: Sequence[Line], others: Sequence[Line]) -> bool:
     return [line[:2] for line in lines] == [line[:2] for line in others]
 
 
-def _clock(columns: Sequence[Column], log: str, several: bool, main: bool) -> list[Line]:
-    column = next((column for column in columns if column.log == log), None)
-    if column is None and several:
+def _no_clock(rising: Sequence[Column], several: bool) -> list[Line]:
+    """Return the questions on the time, if no name or cell shows it; `rising` may be it."""
+    if len(rising) == 1:
+        named = json.dumps(rising[0].name, ensure_ascii=False)
+        remark = f"{named} rises evenly: is it the time?"
+        remark += "" if several else " If not, rate_Hz instead: how many rows come in a second?"
+        return [("from", "?", remark), _unit(rising[0])]
+    if several:
         return [("from", "?", "the column with the time: several logs need their stamps")]
-    if column is None:
-        return [("rate_Hz", "?", "no column holds the time: how many rows come in a second?")]
+    return [("rate_Hz", "?", "no column is named as the time: how many rows come in a second?")]
+
+
+def _unit(clock: Column) -> Line:
+    """Return the line of a clock's unit, by the size of its steps."""
+    fit = sizes.time_units(clock.values)
+    step = float(np.median(sizes.forward_steps(clock.values)))
+    return ("unit", *_one_of(fit, f"steps of {step:.6g}"))
+
+
+def _clock(column: Column, main: bool) -> list[Line]:
     lines: list[Line] = [("from", column.name, "")]
     fit = [column.reading.unit or "s"]
     if column.date:
@@ -207,8 +229,7 @@ def _clock(columns: Sequence[Column], log: str, several: bool, main: bool) -> li
         lines.append(("unit", column.reading.unit, "by its name"))
     elif column.kind != "dates":
         fit = sizes.time_units(column.values)
-        step = float(np.median(sizes.forward_steps(column.values)))
-        lines.append(("unit", *_one_of(fit, f"steps of {step:.6g}")))
+        lines.append(_unit(column))
     if column.untimed:
         lines.append(("drop_rows", list(column.untimed), "without a time: a header, a summary?"))
     return lines + (_rate(column.values, fit[0]) if len(fit) == 1 and main else [])
