@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import polars as pl
 import pytest
@@ -218,6 +219,19 @@ def test_a_file_that_is_not_a_log_is_refused(tmp_path: Path) -> None:
         (tmp_path / "log.csv").write_text(content)
         with pytest.raises(InputError, match=r"log.csv"):
             propose([tmp_path / "log.csv"])
+
+
+@pytest.mark.parametrize("kind", ["mat", "h5"])
+def test_a_file_of_one_matrix_is_refused_with_how_to_read_it(tmp_path: Path, kind: str) -> None:
+    rows = np.column_stack([TIME_s, FORCE_N, DEFLECTION_m])
+    path = tmp_path / f"log.{kind}"
+    if kind == "mat":
+        scipy_io.savemat(path, {"data": rows})
+    else:
+        with h5py.File(path, "w") as file:
+            file["data"] = rows
+    with pytest.raises(InputError, match=r"data: .* x 3 numbers.* log.matrix and log.names"):
+        propose([path])
 
 
 def test_without_a_header_a_column_that_rises_evenly_may_be_the_time(tmp_path: Path) -> None:

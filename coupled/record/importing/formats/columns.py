@@ -18,6 +18,7 @@ from coupled.errors import InputError, shown
 Numbers = NDArray[np.float64] | NDArray[np.int64] | NDArray[np.bool_]
 MOST_COLUMNS = 20_000
 TIMES = ("time", "t", "timestamp")  # names of a struct's stamps
+MATRIX = "log.matrix"
 TEXT = "holds text or objects, no numbers"
 WORDS = ("name", "unit", "group", "stamps", "refused", "unscaled")
 # Words in the names of attributes that scale numbers, and the value that changes nothing: of NWB
@@ -102,9 +103,19 @@ def unread(name: str, values: Any) -> Found | None:
     if values.dtype.kind == "c":
         why = "holds complex numbers; save their parts"
     elif values.dtype.kind in "biuf":
-        why = f"holds an array of {' x '.join(map(str, np.shape(values)))} numbers, no vector; of a"
-        why += " matrix, log.matrix reads the columns"
+        why = f"holds an array of {' x '.join(map(str, np.shape(values)))} numbers, no vector: of a"
+        why += f" matrix, {MATRIX} and log.names in a map give the columns"
     return Found(name, np.zeros(0), refused=why)
+
+
+def check_vectors(path: Path, columns: Sequence[Found]) -> None:
+    """Refuse a file without a vector of numbers, and name its first matrix, which may hold them."""
+    if not all(column.refused for column in columns):
+        return
+    matrix = next((c for c in columns if MATRIX in c.refused), None)
+    if matrix is not None:
+        raise InputError(path, matrix.name, matrix.refused)
+    raise InputError(path, "", "holds no vector of numbers")
 
 
 def by_their_groups(columns: Sequence[Found]) -> list[Found]:

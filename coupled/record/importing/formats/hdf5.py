@@ -23,6 +23,7 @@ from coupled.record.importing.formats.columns import (
     Numbers,
     as_numbers,
     by_their_times,
+    check_vectors,
     columns_of_matrix,
     scaling_in,
     unread,
@@ -56,8 +57,8 @@ def read_hdf5(path: Path, content: bytes, matrix: str, names: list[str] | str) -
             found.update({name: Found(name, column) for name, column in columns.items()})
     if objects and whole:
         replace_objects(found, content, variables)
-    if not objects and all(column.refused for column in found.values()):
-        raise InputError(path, "", "holds no vector of numbers")
+    if not objects:
+        check_vectors(path, list(found.values()))
     return by_their_times(list(found.values()))
 
 

@@ -23,6 +23,7 @@ from coupled.errors import InputError
 from coupled.record.importing.formats.columns import (
     Found,
     by_their_times,
+    check_vectors,
     columns_of_matrix,
     unread,
 )
@@ -52,8 +53,8 @@ def read_matlab(path: Path, content: bytes, matrix: str, names: list[str] | str)
         words = names if isinstance(names, list) else _words(variables.get(names))
         columns = columns_of_matrix(path, matrix, variables.get(matrix), names, words)
         found.update({name: Found(name, values) for name, values in columns.items()})
-    if not objects and all(column.refused for column in found.values()):
-        raise InputError(path, "", "holds no vector of numbers")
+    if not objects:
+        check_vectors(path, list(found.values()))
     return by_their_times(list(found.values()))
 
 
