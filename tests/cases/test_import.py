@@ -70,11 +70,17 @@ def test_a_clock_that_goes_back_is_named_and_its_remedy_works(tmp_path: Path) ->
     folder = taken(tmp_path, "clock-goes-back")
     said = refused(folder, "log.csv")
     assert "log.csv: t: row 121: time goes back" in said
-    for remedy in ("sort = true", "wraps_at = N", "drop_rows = [121]"):
-        assert remedy in said
-    remapped(folder, ("[clock]", "[clock]\nwraps_at = 160"))
+    assert "wraps_at = N" in said
+    assert 'drop_rows = ["121-240"]' in said
+    assert "sort" not in said
+    remapped(folder, ("[clock]", "[clock]\nsort = true"))  # leaves a gap of minutes
+    assert "rows are missing" in refused(folder, "log.csv")
+    remapped(folder, ("sort = true", "wraps_at = 160"))
     record = imported(folder, "log.csv")
     np.testing.assert_array_equal(record["column_force_N"], column(folder, 1))
+    remapped(folder, ("wraps_at = 160", 'drop_rows = ["121-240"]'))
+    record = imported(folder, "log.csv")
+    np.testing.assert_array_equal(record["column_force_N"], column(folder, 1)[:119])
 
 
 def test_sorting_does_not_mix_a_clock_that_was_set_back(tmp_path: Path) -> None:

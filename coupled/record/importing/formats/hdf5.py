@@ -16,7 +16,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from coupled.errors import InputError, shown
+from coupled.errors import shown
 from coupled.record.importing.formats.columns import (
     MOST_COLUMNS,
     Found,
