@@ -181,7 +181,8 @@ def _clocks(
     found = {}
     for name in logs:
         column = next((each for each in stamps if each.log == name), None)
-        rising = [each for each in columns if each.log == name and each.rises]
+        open_ones = [c for c in columns if c.log == name and not c.reading.channel]
+        rising = [each for each in open_ones if each.rises]
         found[name] = (
             _no_clock(rising, len(logs) > 1)
             if column is None
