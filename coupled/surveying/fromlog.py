@@ -4,10 +4,12 @@ The force on the grip is taken for that of a mass on a spring with friction and 
 
     F = m·ẍ + c·ẋ + G·x + F_f·sgn(ẋ) + F_bo·sgn(x) + F_0,
 
-and its numbers for those that satisfy it by least squares in the weak form: multiplied by smooth
-functions φ that vanish with their slopes at the ends of a window, and integrated by parts, so that
-no measured signal is differentiated twice. A slow sweep gives G, F_f and F_bo, a control that is
-let go m and c. `coupled fit` starts from such numbers, and finds them by the rig's own physics.
+where x is the computed deflection, or the grip's in a log without it. The grip moves by K·F more,
+so that the gradient there is G/(1 + K·G). The numbers satisfy it by least squares in the weak form:
+multiplied by smooth functions φ that vanish with their slopes at the ends of a window, and
+integrated by parts, so that no measured signal is differentiated twice. A slow sweep gives G, F_f
+and F_bo, a control that is let go m and c. `coupled fit` starts from such numbers, and finds them
+by the rig's own physics.
 """
 
 from __future__ import annotations
@@ -39,9 +41,9 @@ _BENT = 1e-3  # of the travel: a smaller difference of δ and δc is no bend
 class LogNumbers:
     """What a log gives of a control: SI, d being m or rad.
 
-    `travel` is the greatest deflection in it. `sure` are the names of those whose 95 % interval
-    is within a tenth: `mass`, `damping`, `gradient`, `breakout_N`, `friction_N`, `bend`. `bend`
-    is 0 where the log has not both deflections.
+    `travel` is the greatest deflection in it, `gradient` that at the grip. `sure` are the names of
+    those whose 95 % interval is within a tenth: `mass`, `damping`, `gradient`, `breakout_N`,
+    `friction_N`, `bend`. `bend` is 0 where the log has not both deflections.
     """
 
     travel: float
@@ -69,8 +71,8 @@ def numbers_from_log(record: Record, control: ControlName, file: object) -> LogN
         problem = f"is missing: a first rig needs the force and a deflection of the {control}"
         raise InputError(file, lacking, problem)
     check_samples(record, file)
-    force, x = record[force_name], record[there[0]]
-    travel = float(np.max(np.abs(x)))
+    force, x = record[force_name], record[there[-1]]
+    travel = float(np.max(np.abs(record[there[0]])))
     if travel <= 0.0 or float(np.ptp(force)) <= 0.0:
         raise InputError(file, there[0], f"the {control} does not move, or no force acts on it")
     for name in there:
@@ -96,7 +98,7 @@ def numbers_from_log(record: Record, control: ControlName, file: object) -> LogN
         travel=travel,
         mass=values["mass"],
         damping=values["damping"],
-        gradient=values["gradient"],
+        gradient=values["gradient"] / (1.0 + bend * values["gradient"]),
         breakout_N=values["breakout_N"],
         friction_N=values["friction_N"],
         bend=bend,

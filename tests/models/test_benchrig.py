@@ -40,7 +40,7 @@ def yoke() -> Rig:
     return bench().changed(loader)
 
 
-def log_of(rig: Rig, noise: float, releases: bool = True) -> Record:
+def log_of(rig: Rig, noise: float, releases: bool = True, both: bool = False) -> Record:
     """Return a log of a slow sweep, then of six releases from alternate sides."""
     frames = round((FIRST_s + (6 * EACH_s if releases else 0.0)) * rig.frame_rate)
     t = nodes_of(rig, frames)
@@ -56,6 +56,8 @@ def log_of(rig: Rig, noise: float, releases: bool = True) -> Record:
         "column_force_N": h.hand_force + 0.3 * noise * rng.standard_normal(frames),
         "column_deflection_m": h.deflection + 1e-4 * noise * rng.standard_normal(frames),
     }
+    if both:
+        columns["column_computed_m"] = h.computed + 1e-4 * noise * rng.standard_normal(frames)
     return record_of(columns, "log")
 
 
@@ -76,14 +78,19 @@ def test_a_sweep_alone_does_not_determine_the_mass() -> None:
     assert "mass" not in found.sure
 
 
-def test_the_bend_is_found_where_a_log_has_both_deflections() -> None:
-    record = log_of(yoke(), 0.0)
-    force, deflection = record["column_force_N"], record["column_deflection_m"]
-    computed = deflection - 9e-5 * force
-    columns = {"time_s": record.time_s, "column_force_N": force}
-    columns |= {"column_deflection_m": deflection, "column_computed_m": computed}
-    found = numbers_from_log(record_of(columns, "log"), "column", "log")
-    assert found.bend == pytest.approx(9e-5, rel=1e-6)
+@pytest.mark.parametrize(("noise", "bend"), [(0.0, 9e-5), (0.0, 2e-4), (1.0, 2e-4)])
+def test_of_both_deflections_the_loader_is_that_of_the_computed_one(
+    noise: float, bend: float
+) -> None:
+    """The grip moves by K·F more: the loader's numbers are not those of the grip's motion."""
+    rig = yoke().changed({"controls.column.loader.bend_m_per_N": bend})
+    found = numbers_from_log(log_of(rig, noise, both=True), "column", "log")
+    assert found.bend == pytest.approx(bend, rel=0.01)
+    assert found.gradient == pytest.approx(800.0 / (1.0 + 800.0 * bend), rel=0.01)
+    assert found.mass == pytest.approx(3.0, rel=0.03)
+    assert found.damping == pytest.approx(30.0, rel=0.03)
+    assert found.breakout_N == pytest.approx(6.0, abs=0.1)
+    assert found.friction_N == pytest.approx(4.0, abs=0.1)
     assert "bend" in found.sure
 
 
