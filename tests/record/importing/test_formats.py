@@ -100,8 +100,24 @@ def test_a_map_is_proposed_that_has_every_sensor_by_its_clock(tmp_path: Path, na
     CASES[name][0](tmp_path / name)
     proposal = propose([tmp_path / name])
     assert set(proposal.mapped) == {"column_force_N", "column_deflection_m"}
-    stamps = {"a.mf4": "1.time", "a.tdms": "time"}.get(name, "/force.log_time")
+    stamps = CASES[name][1]["time"]  # of JSON those of the sensors: the recorder's are late
     assert f'[clock]\nfrom = "{stamps}"\nunit = ' in proposal.text
+
+
+@pytest.mark.usefixtures("here")
+def test_a_recorders_stamps_are_proposed_where_a_topic_has_no_other(tmp_path: Path) -> None:
+    with (tmp_path / "a.mcap").open("wb") as file:
+        writer: Any = Writer(file)
+        writer.start()
+        ids = [writer.register_channel(topic, "json", 0) for topic in ("/load", "/grip")]
+        for row in range(60):
+            ns = 1_770_000_000_000_000_000 + row * 10_000_000
+            stamp = {"sec": ns // 10**9, "nanosec": ns % 10**9}
+            sent: dict[str, Any] = {"stamp": stamp, "force_N": np.sin(0.1 * row)}
+            for id_, message in zip(ids, (sent, {"pos_m": np.cos(0.1 * row)}), strict=True):
+                writer.add_message(id_, ns, json.dumps(message).encode(), ns)
+        writer.finish()
+    assert '[clock]\nfrom = "/load.log_time"' in propose([tmp_path / "a.mcap"]).text
 
 
 def write_structs(path: Path, columns: dict[str, dict[str, np.ndarray]]) -> None:

@@ -69,6 +69,13 @@ def proposed(path: Path, rig: str = "") -> tuple[Proposal, dict[str, Any]]:
         ("Weg Soll [mm]", "column_computed_m", "mm"),
         ("Handradwinkel [deg]", "wheel_deflection_rad", "deg"),
         ("Drehmoment_Nm", "", ""),
+        ("rig.qbar_psf", "dynamic_pressure_Pa", "psf"),
+        ("/air.tas [kt]", "true_airspeed_m_per_s", "kt"),
+        ("state.alpha", "alpha_rad", ""),
+        ("cmd.theta", "", ""),
+        ("stick.roll_deg", "", "deg"),
+        ("attitude.q", "", ""),
+        ("stick pitch", "", ""),
     ],
 )
 def test_a_channel_and_its_unit_are_recognised_by_name(name: str, channel: str, unit: str) -> None:

@@ -114,10 +114,26 @@ def read_name(name: str, listed_unit: str = "", log: str = "") -> Reading:
             f" {spelling} " in f" {text} " for spelling in spellings.split("|") if " " in spelling
         ):
             return Reading(found, unit)
+    if field := _motion_of_field(name):
+        return Reading(field, unit, sure=False)
     if text in SHORT and (not unit or _is(unit, "rad")):
         return Reading(SHORT[text], unit)
     moved = _moved(words, unit, words_of(log))
     return moved or Reading("time" if timed else "", unit, not timed)
+
+
+def _motion_of_field(name: str) -> str:
+    """Return the motion that a field of a struct, group or topic is named after, as `air.qbar`.
+
+    Not after one or two letters, such as a quaternion's `q`, nor in a struct of a control or of
+    setpoints.
+    """
+    struct, _, field = name.rpartition(".")
+    words = words_of(_unit(field)[0])
+    if not struct or set(words_of(struct)) & COMMANDS.union(*CONTROLS.values()):
+        return ""
+    text = " ".join(words) if len("".join(words)) > 2 else ""
+    return next((found for found, known in MOTION.items() if text in known.split("|")), "")
 
 
 def _unit(name: str) -> tuple[str, str]:

@@ -37,6 +37,8 @@ from coupled.units import Unit, parse_unit, units_like
 Floats = NDArray[np.float64]
 Line = tuple[str, object, str]  # a key, its value, and a remark
 LISTED = 8  # columns that a question lists
+RECEIVED = ".log_time"  # stamps of an MCAP's recorder
+RECORDED = (RECEIVED, ".publish_time")
 FEWEST = 3  # values of a quantity; a switch has two, a constant one
 
 
@@ -146,10 +148,13 @@ def _stamps_first(
 ) -> list[Column]:
     """Return the clocks, first those with the stamps of the chosen columns' groups.
 
-    Fine stamps come before coarse ones, and stamps in order before those that go back.
+    Fine stamps come before coarse ones, stamps in order before those that go back, and stamps of
+    the senders before those of the recorder, which are late by the transport.
     """
     stamps = {log.file.name: log.stamps for log in logs}
+    sent = _sent(columns, logs, chosen)
     order = [stamps[c.log].get(c.name) for name in CHANNELS if (c := chosen.get(name))]
+    order = [sent.get(name or "", name) for name in order]
     place = {name: i for i, name in reversed(list(enumerate(order)))}
 
     def rank(column: Column) -> tuple[int, bool, bool]:
@@ -158,6 +163,30 @@ def _stamps_first(
         return place.get(column.name, len(order)), coarse, bool((steps < 0.0).any())
 
     return sorted((column for column in columns if column.is_clock), key=rank)
+
+
+def _sent(
+    columns: Sequence[Column], logs: Sequence[Log], chosen: Mapping[str, Column]
+) -> dict[str, str]:
+    """Return the senders' stamps by the recorder's, if all topics of the channels have them."""
+    clocks = {(c.log, c.name) for c in columns if c.is_clock}
+    found: dict[str, str] = {}
+    for log in logs:
+        used = {log.stamps.get(c.name, "") for c in chosen.values() if c.log == log.file.name}
+        topics = [name.removesuffix(RECEIVED) for name in used if name.endswith(RECEIVED)]
+        fields = [
+            {
+                name.removeprefix(topic)
+                for name, group in log.groups.items()
+                if group == topic and log.units.get(name) == "ns"
+                if (log.file.name, name) in clocks and not name.endswith(RECORDED)
+            }
+            for topic in topics
+        ]
+        common = sorted(set.intersection(*fields), key=len) if fields else []
+        if common and len(topics) == len(used):
+            found |= {topic + RECEIVED: topic + common[0] for topic in topics}
+    return found
 
 
 def _named(column: Column, logs: Sequence[str]) -> str:
@@ -223,7 +252,7 @@ def _clock(column: Column, main: bool) -> list[Line]:
         remark = 'in which pattern? as "%d.%m.%Y %H:%M:%S.%f"' if column.date == "?" else ""
         lines.append(("date", column.date, remark))
         fit = [] if remark else fit
-    elif column.kind != "dates" and column.doubt:
+    elif column.kind != "dates" and column.doubt and column.reading.unit:
         lines.append(("unit", "?", column.doubt))
         fit = []
     elif column.kind != "dates" and column.reading.unit:
