@@ -419,6 +419,9 @@ def test_units_below_the_header_are_used_in_any_case_and_below_a_remark(
         ("Grip_mm", "mm", ""),
         ("Grip_mm", "V", ""),
         ("Grip", "-", ""),
+        ("Grip [V]", "", "the log states 'V', no known unit: m or mm"),
+        ("Grip (Zoll)", "", "the log states 'Zoll', no known unit: m or mm"),
+        ("Grip [m]", "", ""),
     ],
 )
 def test_a_unit_that_the_log_leaves_open_is_asked_and_not_guessed_from_the_size(
@@ -426,9 +429,23 @@ def test_a_unit_that_the_log_leaves_open_is_asked_and_not_guessed_from_the_size(
 ) -> None:
     numbers = np.column_stack([TIME_s, FORCE_N, 0.3 * np.sin(TIME_s)])
     rows = [",".join(f"{cell:.9f}" for cell in row) for row in numbers]
-    (tmp_path / "log.csv").write_text("\n".join([f"Time,Load,{name}", f"s,N,{stated}", *rows, ""]))
+    head = [f"Time,Load [N],{name}", *([f"s,N,{stated}"] if stated else [])]
+    (tmp_path / "log.csv").write_text("\n".join([*head, *rows, ""]))
     questions = [each for each in proposed(tmp_path / "log.csv")[0].questions if ".unit" in each]
     assert [says in each for each in questions] == ([True] if says else [])
+
+
+@pytest.mark.parametrize("form", ["{:.5e} N", "{:,.3f}"])
+def test_a_column_of_text_with_a_channels_name_is_left_out_with_the_reason(
+    tmp_path: Path, form: str
+) -> None:
+    force = [form.format(1e3 * each) for each in FORCE_N]
+    table = {"t [s]": TIME_s, "Stick load [N]": force, "Grip [m]": DEFLECTION_m}
+    pl.DataFrame(table).write_csv(tmp_path / "log.csv")
+    proposal, _ = proposed(tmp_path / "log.csv")
+    assert "column_force_N" not in proposal.mapped
+    text = next(each for each in force if not each.replace(".", "").strip("-").isdigit())
+    assert proposal.warnings == (f"Stick load [N]: holds {text!r}, no number, and is left out",)
 
 
 def test_a_force_in_a_unit_of_torque_is_left_out_with_what_it_needs(tmp_path: Path) -> None:

@@ -18,7 +18,7 @@ from coupled.record.importing.mapping import Stamped
 from coupled.record.importing.reading import LATEST_ns, Log
 from coupled.record.importing.suggest.dates import CLOCK, read_dates
 from coupled.record.importing.suggest.dialect import is_number, units_in
-from coupled.record.importing.suggest.names import Reading, read_name
+from coupled.record.importing.suggest.names import Reading, in_brackets, read_name
 from coupled.record.importing.suggest.sizes import USUAL, forward_steps, sentinels
 from coupled.units import parse_unit, usual_unit
 
@@ -113,7 +113,9 @@ def _units_above(log: Log) -> dict[str, str]:
 def _column(log: Log, name: str, unit: str) -> Column:
     own = next((plain for plain, each in log.doubled.items() if name in each), name)
     column = _read(log, name, read_name(own, unit, log.file.stem))
-    return replace(column, doubt=_doubt(unit, read_name(own).unit))
+    # The bracket of a topic's field is an element.
+    stated = unit or ("" if name in log.groups else in_brackets(own))
+    return replace(column, doubt=_doubt(stated, read_name(own).unit))
 
 
 def _doubt(stated: str, named: str) -> str:

@@ -71,6 +71,7 @@ COMPUTER = _set(
     "cpu cpuload gpu ram memory mem bus network net disk battery thread task process queue"
 )
 # A symbol with a prefix, as in `F_kN`, whose capital begins no word of its own.
+_BRACKET = re.compile(r"[\[({<]\s*([^\])}>]+?)\s*[\])}>]\s*$")
 _PREFIXED = re.compile(r"(?<![A-Za-z])([a-z]{1,2}(?:N|Pa|Nm))\W*$")
 
 
@@ -138,7 +139,7 @@ def _motion_of_field(name: str) -> str:
 
 def _unit(name: str) -> tuple[str, str]:
     """Return a name without its unit, and the unit: in brackets, or as the last words."""
-    bracket = re.search(r"[\[({<]\s*([^\])}>]+?)\s*[\])}>]\s*$", name)
+    bracket = _BRACKET.search(name)
     if bracket and parse_unit(bracket.group(1)) is not None:
         return name[: bracket.start()], bracket.group(1)
     prefixed = _PREFIXED.search(name)
@@ -151,6 +152,12 @@ def _unit(name: str) -> tuple[str, str]:
         if len(words) > count and last in SPELLINGS:
             return " ".join(words[:-count]), SPELLINGS[last]
     return name, ""
+
+
+def in_brackets(name: str) -> str:
+    """Return the text in brackets at the end of a name, where a unit may be; "" without one."""
+    bracket = _BRACKET.search(name)
+    return bracket.group(1) if bracket else ""
 
 
 def _is(unit: str, other: str) -> bool:

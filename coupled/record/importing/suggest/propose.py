@@ -7,15 +7,16 @@ refused until the user has answered all. Signs of loads and scales of counts are
 from __future__ import annotations
 
 import json
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import polars as pl
 from numpy.typing import NDArray
 
-from coupled.errors import InputError
+from coupled.errors import InputError, shown
 from coupled.record.channels import CONTROL_NAMES
 from coupled.record.channels import channel as channel_name
 from coupled.record.importing.formats.columns import TEXT
@@ -25,7 +26,7 @@ from coupled.record.importing.reading import Log, read_log
 from coupled.record.importing.rows import COARSE
 from coupled.record.importing.suggest import sizes
 from coupled.record.importing.suggest.columns import Column, columns_of, missing_in
-from coupled.record.importing.suggest.dialect import guess_layout
+from coupled.record.importing.suggest.dialect import guess_layout, is_number
 from coupled.record.importing.suggest.ends import settle_ends
 from coupled.record.importing.suggest.names import is_torque, words_of
 from coupled.rig.parameters import Control
@@ -105,9 +106,23 @@ def propose(files: Sequence[Path], rig: Rig | None = None) -> Proposal:
     warnings = [note for log in read for note in log.notes]
     refused = [each for log in read for each in log.refused.items()]
     warnings += [f"{name}: {why}" for name, why in refused if why != TEXT]
+    warnings += _texts(read, left, chosen, logs)
     arms = {_named(column, logs) for column in left if _is_torque(column)}
     text = _text(sections, logs, unmapped, arms)
     return Proposal(text, questions, mapped, unmapped, tuple(dict.fromkeys(warnings)))
+
+
+def _texts(
+    logs: Sequence[Log], left: Sequence[Column], chosen: Mapping[str, Column], names: Sequence[str]
+) -> Iterator[str]:
+    """Yield why columns with a channel's name are left out whose cells are text."""
+    read = {log.file.name: log for log in logs}
+    for column in left:
+        cells = read[column.log].columns[column.name]
+        open_channel = column.reading.channel not in ("", "time", *chosen)
+        if column.kind == "text" and open_channel and cells.dtype == pl.String:
+            cell = next((str(each) for each in cells if each and not is_number(str(each))), "")
+            yield f"{_named(column, names)}: holds {shown(cell, 40)!r}, no number, and is left out"
 
 
 def _read(files: Sequence[Path], layout: Layout) -> tuple[list[Log], list[Column]]:
