@@ -14,7 +14,7 @@ interpolated between the rows.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -256,14 +256,19 @@ def clipped(record: Record, control: ControlName, file: str) -> list[str]:
 
 
 def not_measured(
-    record: Record, control: ControlName | None, file: str, set_points: bool = False
+    record: Record,
+    control: ControlName | None,
+    file: str,
+    set_points: bool = False,
+    motion: Collection[str] = (),
 ) -> list[str]:
-    """Return a sentence on each sensor of a control that repeats its readings.
+    """Return a sentence on each sensor of a control, or of the motion, that repeats its readings.
 
     A force may be applied in steps, and δc if it is a set point; they are longer than those of the
     slowest log. One more sentence tells that the import has interpolated the log's rows.
     """
     signals = {} if control is None else _signals(record, control)
+    signals |= {name: record[name] for name in motion if name in record}
     rate_Hz = sampling_rate_of(record, file)
     applied = ("force", "computed") if set_points else ("force",)
     most = {} if control is None else {channel(control, q): rate_Hz / RATES_Hz[0] for q in applied}

@@ -199,8 +199,11 @@ def prepare(
     check_labels(outputs, readers, records)
     own = control if part.own else None
     set_points = readers[0].set_points
+    motion = dict.fromkeys(one.channel for one in outputs if one.stage == AIRFRAME)
     repeated = [
-        words for file, one in records.items() for words in not_measured(one, own, file, set_points)
+        words
+        for file, one in records.items()
+        for words in not_measured(one, own, file, set_points, motion)
     ]
     left_out = [stepped, *(why for one in live for why in one.left_out), *repeated]
     left_out += [

@@ -185,6 +185,7 @@ def test_a_healthy_record_that_misses_its_rig_hides_no_change() -> None:
     assert found.as_dict()["healthy"]["errors"]["column_deflection_m"]["misses"] > 2.0
 
 
+@pytest.mark.slow
 def test_beside_a_healthy_record_of_the_rig_the_change_is_named() -> None:
     found = beside_healthy(MACHINE)
     assert found.verdict == "effect"

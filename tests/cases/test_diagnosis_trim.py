@@ -64,7 +64,12 @@ def test_the_trim_is_taken_from_the_first_rows_without_a_manifest(
 
 @pytest.mark.parametrize(
     ("faster", "higher_m", "climb"),
-    [(1.01, 0.0, 0.0), (1.0, 60.0, 0.0), (1.0, 0.0, 0.003), (1.0, 0.0, 0.0)],
+    [
+        (1.01, 0.0, 0.0),
+        pytest.param(1.0, 60.0, 0.0, marks=pytest.mark.slow),
+        pytest.param(1.0, 0.0, 0.003, marks=pytest.mark.slow),
+        (1.0, 0.0, 0.0),
+    ],
 )
 def test_a_healthy_flight_at_nearly_the_filed_trim_has_no_gap(
     faster: float, higher_m: float, climb: float
@@ -133,7 +138,8 @@ def test_another_aircraft_and_a_record_without_its_trim_are_refused(
         api.diagnose(filed, {"a": slow_737, "b": later})
 
 
-@pytest.mark.parametrize("faster", [1.02, pytest.param(1.25, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("faster", [1.02, 1.25])
 def test_each_record_is_flown_from_its_own_trim(faster: float) -> None:
     """A record 2 % faster than the first was flown from the first one's trim, and had a gap."""
     rig = noisy(api.load_rig("c172p"))
@@ -196,6 +202,7 @@ def test_an_improved_rig_keeps_the_rig_files_trim(tmp_path: Path) -> None:
     assert improved.controls["column"].loader.bend == pytest.approx(6e-4, rel=0.03)
 
 
+@pytest.mark.slow
 def test_on_a_hot_day_the_air_is_as_probable_as_a_mass() -> None:
     """Mass and inertias had 0.89 each, and were to be set."""
     rig = noisy(api.load_rig("c172p"))

@@ -75,6 +75,7 @@ def factor(found: Diagnosis, name: str) -> tuple[float, float, float]:
     return number.low, number.value, number.high
 
 
+@pytest.mark.slow
 def test_a_log_of_jsbsim_shows_what_was_edited_in_its_model(tmp_path: Path) -> None:
     log, _ = flown(tmp_path, {"/Cmq": 0.7}, 16.0, rate_Hz=30.0)
     alone().save(tmp_path / "air.toml")
@@ -144,6 +145,7 @@ def test_surfaces_that_jump_between_the_rows_are_no_fault(tmp_path: Path) -> Non
         assert np.sqrt(np.mean(off**2)) < 1.2 * output.floor, output.channel
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("function", "name", "factor"), [("/Cmq", "pitch_damping", 0.0), ("/Cnda", "adverse_yaw", -1.0)]
 )
@@ -208,6 +210,18 @@ def test_a_log_that_starts_in_a_manoeuvre_is_named(healthy: Record) -> None:
     assert "pitch_rate_rad_per_s starts at" in words
     (said,) = (one for one in prepare(alone(), {"log": begun}, AIRFRAME).left_out if "trim" in one)
     assert said == words
+
+
+def test_a_sensor_of_the_motion_that_holds_its_values_is_named(healthy: Record) -> None:
+    """Air data of a bus of 20 Hz in a log of 120 rows a second was a gap without any reason."""
+    noisy_one = with_noise(healthy)
+    data, at = noisy_one.data.copy(), healthy.channels.index("alpha_rad")
+    data[:, at] = data[np.arange(len(data)) // 6 * 6, at]
+    every, held = (Record(healthy.channels, one) for one in (noisy_one.data, data))
+    said = [prepare(alone(), {"log": one}, AIRFRAME) for one in (every, held)]
+    assert not any("holds each value" in words for words in said[0].left_out)
+    (words,) = (words for words in said[1].left_out if "holds each value" in words)
+    assert words.startswith("alpha_rad of log holds each value over 6 rows")
 
 
 def test_a_trim_that_no_channel_shows_is_named_beside_a_gap(healthy: Record) -> None:

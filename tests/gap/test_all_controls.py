@@ -235,6 +235,7 @@ def test_the_json_names_the_control_of_each_effect() -> None:
     assert set(row.effects) == {"wheel.bend", "elevator_effectiveness"}
 
 
+@pytest.mark.slow
 def test_a_summary_names_the_part_of_each_gap() -> None:
     said = whole(*WORN.items()).summary
     assert "Wheel: Bend, 6.09e-4 → 0.002" in said

@@ -114,6 +114,7 @@ def outputs_of_the_well() -> list[Output]:
     return outputs_of(WELL)
 
 
+@pytest.mark.slow
 def test_a_healthy_machine_of_another_day_is_as_it_was() -> None:
     """One in 50 may be called changed: of 12 days one is in a fifth of all tests."""
     days = [compared(WELL, [screw(day)]) for day in range(20, 32)]

@@ -176,6 +176,7 @@ def diagnosed(changes: dict[str, object]) -> PartDiagnosis:
     return findings(prepared, *search_sets(prepared.case, library))
 
 
+@pytest.mark.slow
 def test_effects_that_approximate_a_curve_are_less_probable_than_the_curve() -> None:
     """A spring with a dead zone was a gradient error and a cubic stiffness of 0.89 each."""
     zone = {"deflection_m": [-0.1, -1e-3, 1e-3, 0.1], "force_N": [1.65, 1.65, -1.65, -1.65]}

@@ -100,6 +100,7 @@ def folder_of(tmp_path: Path, record: Record, *names: str) -> Path:
     return tmp_path
 
 
+@pytest.mark.slow
 def test_a_folder_is_diagnosed_on_the_control_that_was_asked_for(
     tmp_path: Path, clean: Record
 ) -> None:

@@ -65,7 +65,7 @@ def test_a_hardening_spring_and_a_damping_are_found_under_a_broadband_force(to_H
     assert damping.verdict == spring.verdict == "effect"
 
 
-@pytest.mark.parametrize("factor", [0.6, 1.9])
+@pytest.mark.parametrize("factor", [0.6, pytest.param(1.9, marks=pytest.mark.slow)])
 def test_the_damping_of_a_slow_machine_without_a_spring_is_found(factor: float) -> None:
     """Restarted four times a second, a machine of 1.7 s followed a record of any damping."""
     found = diagnose(slider_rig(), {"r": slider(1, factor)})

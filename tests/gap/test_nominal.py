@@ -92,6 +92,7 @@ def imposed_with_rests(rest_N: float) -> Record:
     return Record(names, np.column_stack((time, pull, place)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rest_N", [0.0, 1.5, -4.0])
 def test_a_rest_does_not_count_as_sliding(rest_N: float) -> None:
     keys = ["loader.friction_N", "loader.damping_N_s_per_m"]

@@ -94,6 +94,7 @@ def test_what_a_bench_applies_in_long_steps_is_measured(
     assert len(said) == count
 
 
+@pytest.mark.slow
 def test_an_effect_beside_a_sensor_that_holds_its_value_is_as_probably_the_recorders(
     tmp_path: Path,
 ) -> None:
@@ -220,6 +221,7 @@ def test_a_motion_of_the_models_sign_is_judged(flown: Record) -> None:
     assert diagnose(nominal_rig(True), {"r.csv": flown}, "column").verdict == "no_gap"
 
 
+@pytest.mark.slow
 def test_a_repeating_sensor_is_no_alternative_to_an_effect_that_explains_nothing(
     tmp_path: Path,
 ) -> None:

@@ -78,6 +78,7 @@ def test_a_trim_within_the_error_of_the_measured_one_is_that_of_the_record(
     assert flown == pytest.approx(measured + off, abs=1e-12)
 
 
+@pytest.mark.slow
 def test_the_error_of_a_trim_puts_no_barrier_before_the_right_model() -> None:
     """At 0.9 the residual once was larger than at 1, and no search passed that."""
     filed, name = noisy(read_rig(shipped_rigs()["t37"])), "aero/coefficient/CLde"

@@ -73,6 +73,7 @@ def test_beside_an_effect_without_a_number_another_stage_is_explained_too(tmp_pa
     assert {effect.name for effect in found.effects} == set(both)
 
 
+@pytest.mark.slow
 def test_a_number_within_its_tolerance_is_no_effect_and_one_beyond_it_is(tmp_path: Path) -> None:
     assert answer(tmp_path, {"inertia": {"factor": 1.01}}, 7).verdict == "no_gap"
     beyond = answer(tmp_path, {"inertia": {"factor": 1.15}}, 7)
@@ -113,6 +114,7 @@ def test_the_tolerance_is_that_of_the_rig_file(
     assert [effect.name for effect in diagnose(nominal, {"r": record}).effects] == found
 
 
+@pytest.mark.slow
 def test_what_no_record_separates_is_ambiguous(tmp_path: Path) -> None:
     """Where nothing bends, the zero of a gauge and a constant force are one law."""
     rigid = nominal_rig(False).changed(
