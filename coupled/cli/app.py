@@ -48,17 +48,21 @@ _FAULTS = 3000  # characters of a file's faults that are printed
 _GARBAGE = 100_000  # a command is short: garbage is collected less often
 
 RunArgument = Annotated[
-    str, typer.Argument(help="A run file, or the name of a shipped one (coupled runs).")
+    str, typer.Argument(help="A run file, or the name of a shipped run (see coupled runs).")
 ]
 JsonOption = Annotated[
-    str, typer.Option("--json", metavar="FILE", help="Write the result as JSON; - prints it.")
+    str,
+    typer.Option(
+        "--json", metavar="FILE", help="Write the result as JSON to this file; - prints it."
+    ),
 ]
 
 
 UnitsOption = Annotated[
     System,
     typer.Option(
-        "--units", help="What people read: si, or us for lb, in, kt, ft, °. Files stay in SI."
+        "--units",
+        help="Units of printed text and figures: si, or us (lb, in, kt, ft, °). Files stay in SI.",
     ),
 ]
 
@@ -67,21 +71,30 @@ PanelsOption = Annotated[
     typer.Option(
         "--panels",
         metavar="NAMES",
-        help="Panels of the figure, as surface,force: surface, motion, force, loss; of a sweep,"
-        " the figures that it keeps. (default: all)",
+        help="Panels of the figure, separated by commas: surface, motion, force, loss; of a sweep,"
+        " names listed in its keep. (default: all)",
     ),
 ]
 OverlayOption = Annotated[
-    bool, typer.Option("--overlay", help="Cases, of a sweep configurations, in the same axes.")
+    bool,
+    typer.Option(
+        "--overlay", help="Draw all cases (of a sweep, all configurations) in the same axes."
+    ),
 ]
 SizeOption = Annotated[
     str,
-    typer.Option("--size", metavar="WxH", help="Of the figure in print: 8.5x6cm, 85x60mm, 3x2in."),
+    typer.Option(
+        "--size",
+        metavar="WxH",
+        help="Printed size of the figure, in cm, mm or in, as 8.5x6cm. (default: by the panels)",
+    ),
 ]
 
 WideOption = Annotated[
     bool,
-    typer.Option("--wide", help="Tables with all columns, wider than the terminal if need be."),
+    typer.Option(
+        "--wide", help="Print all columns of each table, even if lines exceed the terminal's width."
+    ),
 ]
 
 

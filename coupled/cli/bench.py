@@ -49,35 +49,49 @@ _GRID = 5  # gradient sets, and readings in each
 def bench(
     rig: RigOption = DEFAULT_RIG,
     control: ControlOption = "column",
-    gradients: Annotated[int, typer.Option(help="Gradient sets.", min=1, max=30)] = _GRID,
-    deflections: Annotated[int, typer.Option(help="Readings in each.", min=1, max=60)] = _GRID,
-    nulls: Annotated[int, typer.Option(help="Nulls for S2.", min=0, max=50)] = 6,
+    gradients: Annotated[int, typer.Option(help="Number of gradient sets.", min=1, max=30)] = _GRID,
+    deflections: Annotated[
+        int, typer.Option(help="Number of readings in each gradient set.", min=1, max=60)
+    ] = _GRID,
+    nulls: Annotated[
+        int, typer.Option(help="Number of nulls, the readings for S2.", min=0, max=50)
+    ] = 6,
     once: OnceOption = False,
     crossed: CrossedOption = 0.0,
     precision: Annotated[
         float | None,
         typer.Option(
-            help="Instead of a grid, the readings that a plan wants for K to ± %.", min=0.1, max=100
+            help="Take the readings of a plan that determines K to ± this many % (95 % interval)."
+            " (default: the grid of --gradients and --deflections)",
+            min=0.1,
+            max=100,
         ),
     ] = None,
     strongest: StrongestOption = 150.0,
-    seed: Annotated[int, typer.Option(help="Seed of the errors of hand and eyes.", min=0)] = 0,
+    seed: Annotated[int, typer.Option(help="Seed of the random errors.", min=0)] = 0,
     output: Annotated[
         Path | None,
-        typer.Option("--output", "-o", help="Readings, CSV (default: out/RIG-readings.csv)."),
+        typer.Option(
+            "--output", "-o", help="File of the readings, CSV. (default: out/RIG-readings.csv)"
+        ),
     ] = None,
-    inches: Annotated[bool, typer.Option("--inches", help="In inches and pounds.")] = False,
-    perfect: Annotated[bool, typer.Option("--perfect", help="Readings without any error.")] = False,
+    inches: Annotated[
+        bool, typer.Option("--inches", help="Write inches and pounds. (default: m and N)")
+    ] = False,
+    perfect: Annotated[bool, typer.Option("--perfect", help="Simulate no errors.")] = False,
     repeat: Annotated[
         int,
         typer.Option(
-            help="Fit so many benches and count how often they are right.", min=0, max=100_000
+            help="Simulate and fit this many benches, and print how often the 95 % intervals"
+            " contain the true values; 0: write the readings of one bench.",
+            min=0,
+            max=100_000,
         ),
     ] = 0,
     error: ErrorOption = None,
     json_file: JsonOption = "",
 ) -> None:
-    """Take readings at a simulated rig, as a person with ruler, scale and voltmeter does."""
+    """Simulate calibration readings of a rig by ruler, spring scale and voltmeter."""
     from coupled.calibration.bench import CalibrationBench, take_readings
     from coupled.calibration.crossed import crossed_forces
     from coupled.calibration.estimate import perfect_instruments

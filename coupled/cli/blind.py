@@ -18,7 +18,7 @@ from coupled.outputs import Outputs
 if TYPE_CHECKING:
     from coupled.blind.trials.result import Score
 
-blind = typer.Typer(no_args_is_help=True, help="Make sealed trials, and score their diagnoses.")
+blind = typer.Typer(no_args_is_help=True, help="Make sealed trials, and score diagnoses of them.")
 app.add_typer(blind, name="blind")
 
 
@@ -27,22 +27,37 @@ def make(
     folder: Annotated[Path, typer.Argument(help="A new folder for records, rigs and seal.")],
     key: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Where to write the key. (default: DIR.key.json)"),
+        typer.Option(
+            metavar="FILE", help="File of the key, the true effects. (default: FOLDER.key.json)"
+        ),
     ] = None,
     seed: Annotated[
-        int | None, typer.Option(min=0, help="The same seed gives the same bytes. (default: drawn)")
+        int | None,
+        typer.Option(min=0, help="Seed; the same seed gives the same files. (default: random)"),
     ] = None,
-    records: Annotated[int, typer.Option(min=1, max=9999, help="How many.")] = 300,
-    rigs: Annotated[int, typer.Option(min=0, max=999, help="Rigs beside the version's own.")] = 24,
-    trials: Annotated[int, typer.Option(min=1, help="Version of the trials.")] = NEWEST,
+    records: Annotated[int, typer.Option(min=1, max=9999, help="Number of records.")] = 300,
+    rigs: Annotated[
+        int, typer.Option(min=0, max=999, help="Number of random rigs beside the version's own.")
+    ] = 24,
+    trials: Annotated[
+        int, typer.Option(min=1, help="Version of the trials: effects, sizes, flights.")
+    ] = NEWEST,
     workers: Annotated[
         int | None,
         typer.Option(
-            "--workers", "-j", min=0, max=512, help="Processes; 0: one a core. (default: 0)"
+            "--workers",
+            "-j",
+            min=0,
+            max=512,
+            help="Number of processes; 0: one for each core. (default: 0)",
         ),
     ] = None,
     cluster: Annotated[
-        str, typer.Option(metavar="ADDRESS", help="A dask scheduler's, to make them there.")
+        str,
+        typer.Option(
+            metavar="ADDRESS",
+            help="Address of a dask scheduler, whose workers make them. (default: this computer)",
+        ),
     ] = "",
 ) -> None:
     """Write sealed records of an independent twin, with and without effects, and their key."""
@@ -80,18 +95,23 @@ def make(
     epilog="[dim]Example: coupled blind score out/diagnoses --key out/trials.key.json[/]"
 )
 def score(
-    diagnoses: Annotated[Path, typer.Argument(help="A folder of diagnoses, rNNN.json each.")],
-    key: Annotated[Path, typer.Option(metavar="FILE", help="The key of the trials.")],
+    diagnoses: Annotated[
+        Path, typer.Argument(help="Folder of the diagnoses: rNNN.json for each record.")
+    ],
+    key: Annotated[Path, typer.Option(metavar="FILE", help="File of the trials' key.")],
     seal: Annotated[
         Path | None,
-        typer.Option(help="The trials' seal. (default: seal.toml of DIR for DIR.key.json)"),
+        typer.Option(
+            help="File of the trials' seal. (default: FOLDER/seal.toml for FOLDER.key.json)"
+        ),
     ] = None,
     json_file: JsonOption = "",
     figure: Annotated[
-        Path | None, typer.Option(help="Power and reliability: PNG, PDF or SVG.")
+        Path | None,
+        typer.Option(help="Draw power and reliability: PNG, PDF or SVG. (default: no figure)"),
     ] = None,
 ) -> None:
-    """Score diagnoses of sealed trials against their key, each share with its exact interval."""
+    """Score diagnoses of sealed trials against their key, with exact 95 % intervals."""
     from coupled.blind.trials.answers import read_answers
     from coupled.blind.trials.key import SEAL, check_seal, read_key
     from coupled.blind.trials.score import score as score_answers

@@ -52,43 +52,56 @@ _PRECISION, _STRONGEST_N = 5.0, 150.0
     " · coupled calibrate --plan --precision 5[/]"
 )
 def calibrate(
-    readings: Annotated[Path | None, typer.Argument(help="Readings, CSV.")] = None,
+    readings: Annotated[Path | None, typer.Argument(help="Readings, CSV; not with --plan.")] = None,
     rig: Annotated[
         str,
         typer.Option(
-            help="A rig file, or the name of a shipped one: its travel, arc, gains and gradients"
-            f" count. (default: {DEFAULT_RIG})"
+            help="A rig file, or the name of a shipped rig, for travel, arc, gains and gradients."
+            f" (default: {DEFAULT_RIG})"
         ),
     ] = "",
     control: ControlOption = "column",
     write: Annotated[
         Path | None,
-        typer.Option(metavar="NEW", help="Write the calibrated rig, .toml; a plan's form, .csv."),
+        typer.Option(
+            metavar="NEW",
+            help="Write the calibrated rig to this .toml; with --plan, a form for readings to"
+            " .csv.",
+        ),
     ] = None,
     hardware: Annotated[
         bool,
         typer.Option(
             "--hardware",
-            help="For readings of a real loader: what is found is the rig's own hardware, too.",
+            help="With --write, for readings of a real loader: write the results as the rig's"
+            " hardware, too. (default: only as the host's values)",
         ),
     ] = False,
-    date: Annotated[str, typer.Option(help="Noted in the rig file as given.")] = "",
-    plan: Annotated[bool, typer.Option("--plan", help="Choose readings to take.")] = False,
+    date: Annotated[
+        str, typer.Option(help="Date of the readings, any text, for the rig file.")
+    ] = "",
+    plan: Annotated[
+        bool, typer.Option("--plan", help="Print which readings to take; give no readings.")
+    ] = False,
     precision: Annotated[
-        float, typer.Option(help="How well a plan is to find K, ± % (95 %).", min=0.1, max=100)
+        float,
+        typer.Option(
+            help="With --plan: half-width of the 95 % interval of K, % of K.", min=0.1, max=100
+        ),
     ] = _PRECISION,
     strongest: StrongestOption = _STRONGEST_N,
     once: OnceOption = False,
     crossed: CrossedOption = 0.0,
     figure: Annotated[
-        Path | None, typer.Option(help="Draw readings and fit (figure 4): PNG, PDF or SVG.")
+        Path | None,
+        typer.Option(help="Draw readings and fit (the report's figure 4): PNG, PDF or SVG."),
     ] = None,
     error: ErrorOption = None,
     json_file: JsonOption = "",
     report: ReportOption = None,
     units: UnitsOption = "si",
 ) -> None:
-    """Find S1, S2, S3 and K from readings, with their errors; or plan the readings."""
+    """Estimate S1, S2, S3 and K from readings, with standard errors; or plan the readings."""
     file, data, name = rig_and_control(rig or DEFAULT_RIG, control)
     tools = instruments(name, error)
     if plan:

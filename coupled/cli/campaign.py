@@ -40,8 +40,10 @@ if TYPE_CHECKING:
     " · coupled check runs/*.toml --junit out/junit.xml --report out/check.html[/]"
 )
 def check(
-    run: Annotated[list[str], typer.Argument(help="Run files, or names of shipped ones.")],
-    junit: Annotated[Path | None, typer.Option(metavar="FILE", help="Write JUnit XML.")] = None,
+    run: Annotated[list[str], typer.Argument(help="Run files, or names of shipped runs.")],
+    junit: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Write the results as JUnit XML.")
+    ] = None,
     json_file: JsonOption = "",
     report: ReportOption = None,
     units: UnitsOption = "si",
@@ -99,21 +101,33 @@ def check(
 )
 def sweep(
     name: Annotated[
-        str, typer.Argument(metavar="FILE", help="A sweep file, TOML, or a shipped one's name.")
+        str,
+        typer.Argument(metavar="FILE", help="A sweep file (TOML), or the name of a shipped sweep."),
     ],
     folder: Annotated[
         Path | None,
-        typer.Option(help="Folder of the flights and their table. (default: out/NAME)"),
+        typer.Option(help="Folder of journal, table and figure. (default: out/NAME)"),
     ] = None,
     workers: Annotated[
         int | None,
-        typer.Option("--workers", "-j", min=1, max=512, help="Processes. (default: all cores)"),
+        typer.Option(
+            "--workers",
+            "-j",
+            min=1,
+            max=512,
+            help="Number of processes. (default: one for each core)",
+        ),
     ] = None,
     cluster: Annotated[
-        str, typer.Option(metavar="ADDRESS", help="A dask scheduler's, to fly there instead.")
+        str,
+        typer.Option(
+            metavar="ADDRESS",
+            help="Address of a dask scheduler, whose workers fly. (default: this computer)",
+        ),
     ] = "",
     figure: Annotated[
-        Path | None, typer.Option(help="PNG, PDF or SVG. (default: FOLDER/sweep.png)")
+        Path | None,
+        typer.Option(help="File of the figure: PNG, PDF or SVG. (default: FOLDER/sweep.png)"),
     ] = None,
     json_file: JsonOption = "",
     report: ReportOption = None,
@@ -122,7 +136,7 @@ def sweep(
     overlay: OverlayOption = False,
     size: SizeOption = "",
 ) -> None:
-    """Fly a run over values of its parameters, to one table; the same command resumes it."""
+    """Fly a run over values of its parameters; write one table. Repeat the command to resume."""
     from coupled.campaign.journal import JOURNAL
     from coupled.campaign.plan import read_plan
     from coupled.campaign.sensitivity import INDICES

@@ -35,39 +35,56 @@ if TYPE_CHECKING:
     " · coupled document t37 --control column --write new.toml[/]"
 )
 def document(
-    rig: Annotated[str, typer.Argument(help="A rig file, or a shipped one.")] = DEFAULT_RIG,
-    control: Annotated[str, typer.Option(help="One control only (default: all).")] = "",
+    rig: Annotated[
+        str, typer.Argument(help="A rig file, or the name of a shipped rig.")
+    ] = DEFAULT_RIG,
+    control: Annotated[
+        str, typer.Option(help="One control only: column, wheel or pedals. (default: all)")
+    ] = "",
     readings: Annotated[
-        Path | None, typer.Option(help="Readings to draw (default: a virtual bench's).")
+        Path | None, typer.Option(help="Readings to draw, CSV. (default: simulated readings)")
     ] = None,
     specified: Annotated[
-        str, typer.Option(help="A rig that says what is specified (default: this one's own file).")
+        str,
+        typer.Option(
+            help="A rig file, or a shipped rig, with the specified schedule, mass, damping and"
+            " friction. (default: RIG)"
+        ),
     ] = "",
     aircraft: Annotated[
         Path | None,
-        typer.Option(help="The aircraft's own forces, a CSV: the reference of the static checks."),
+        typer.Option(
+            help="CSV of forces measured on the aircraft, the reference of the static checks."
+            " (default: the schedule is)"
+        ),
     ] = None,
     write: Annotated[
         Path | None,
         typer.Option(
-            help="Write the rig with mass, damping and a lead on the force that go with the"
-            " gradient, so that compensated releases are as specified, and document that one."
+            help="Write a rig whose mass, damping and force lead depend on the gradient, so that"
+            " compensated releases are as specified; document this rig."
         ),
     ] = None,
     output: Annotated[
         Path | None,
-        typer.Option("--output", "-o", help="Folder (default: out/RIG-document)."),
+        typer.Option("--output", "-o", help="Folder of the pages. (default: out/RIG-document)"),
     ] = None,
-    every: Annotated[bool, typer.Option("--all", help="Print every check.")] = False,
-    date: Annotated[str, typer.Option(help="Date of this issue, printed as given.")] = "",
-    revision: Annotated[str, typer.Option(help="Revision of the document, printed as given.")] = "",
+    every: Annotated[
+        bool,
+        typer.Option(
+            "--all",
+            help="Print all checks. (default: failed ones, and the least margin of each kind)",
+        ),
+    ] = False,
+    date: Annotated[str, typer.Option(help="Date of the document, any text.")] = "",
+    revision: Annotated[str, typer.Option(help="Revision of the document, any text.")] = "",
     json_file: JsonOption = "",
     report: ReportOption = None,
     units: UnitsOption = "si",
 ) -> None:
     """Document a rig's forces: X-Y plots, figure 4, and 14 CFR Part 60 control checks.
 
-    A check that fails gives exit code 1, and the table has the reason.
+    Exit code 1 if a check fails; the reason is printed below the checks.
     """
     from coupled.calibration.documentation import controls_of
     from coupled.calibration.forcedocument import document_rig

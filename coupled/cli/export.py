@@ -28,27 +28,42 @@ if TYPE_CHECKING:
     " · coupled export report-column --jsbsim DIR --run multiplier --case 'digital 20 Hz'[/]"
 )
 def export(
-    rig: Annotated[str, typer.Argument(help="A rig file, or the name of a shipped one.")],
+    rig: Annotated[str, typer.Argument(help="A rig file, or the name of a shipped rig.")],
     jsbsim: Annotated[
-        Path | None, typer.Option(help="The folder to write: new, or a former export.")
+        Path | None,
+        typer.Option(
+            help="Write the JSBSim export to this folder: a new one, or an earlier export."
+        ),
     ] = None,
-    fmu: Annotated[Path | None, typer.Option(help="The FMU to write, for this platform.")] = None,
-    control: Annotated[str, typer.Option(help="The control of the FMU, of several.")] = "",
+    fmu: Annotated[
+        Path | None, typer.Option(help="Write an FMU with machine code for this platform.")
+    ] = None,
+    control: Annotated[
+        str,
+        typer.Option(help="With --fmu: its control; required if the rig has several."),
+    ] = "",
     fmi: Annotated[
-        int, typer.Option(help="The version of FMI.", min=2, max=3, show_default=True)
+        int, typer.Option(help="With --fmu: version of FMI.", min=2, max=3, show_default=True)
     ] = 3,
     run: Annotated[
         list[str] | None,
-        typer.Option(help="A run to write scripts of; may be repeated. (default: the rig's)"),
+        typer.Option(
+            help="A run to write scripts for; may be repeated. (default: the rig's shipped runs)"
+        ),
     ] = None,
     case: Annotated[
-        str, typer.Option(help="Export the rig as this case of the run has it, and this case only.")
+        str,
+        typer.Option(help="Label of a case of --run: export this case only, with its rig keys."),
     ] = "",
     rate: Annotated[
-        float, typer.Option("--loader-rate-Hz", help="Least rate of the loader.", min=1)
+        float,
+        typer.Option("--loader-rate-Hz", help="Minimum rate of the loader in JSBSim, Hz.", min=1),
     ] = 960.0,
     no_check: Annotated[
-        bool, typer.Option("--no-check", help="Do not fly the scripts by JSBSim alone.")
+        bool,
+        typer.Option(
+            "--no-check", help="Do not fly the scripts in JSBSim to compare them with coupled."
+        ),
     ] = False,
     json_file: JsonOption = "",
 ) -> None:

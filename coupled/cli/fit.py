@@ -31,24 +31,31 @@ def fit(
         list[Path],
         typer.Argument(metavar="RECORD...", help=f"Records of the healthy machine, {RECORDS}."),
     ],
-    rig: Annotated[str, typer.Option(help="The rig file to start from, or a shipped one.")],
+    rig: Annotated[
+        str, typer.Option(help="The rig to start from: a rig file, or the name of a shipped rig.")
+    ],
     free: Annotated[
         list[str] | None,
         typer.Option(
             metavar="KEY",
-            help="A number of the control to fit, as loader.mass_kg; may be given often."
-            " (default: those that the records judge)",
+            help="Key of the control to fit, as loader.mass_kg; may be repeated. (default: mass,"
+            " damping, G_B, friction, offset, delay, servo, bend, play, as the channels allow)",
         ),
     ] = None,
     control: ControlOption = "column",
     output: Annotated[
         Path | None,
-        typer.Option("--output", "-o", metavar="NEW.toml", help="Write the fitted rig there."),
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="NEW.toml",
+            help="Write the fitted rig to this file. (default: only print it)",
+        ),
     ] = None,
     json_file: JsonOption = "",
     wide: WideOption = False,
 ) -> None:
-    """Fit a nominal rig to records of a healthy machine, and list what they do not determine."""
+    """Fit a nominal rig to records of a healthy machine; list undetermined parameters."""
     from coupled.gap.nominal import fit_nominal
     from coupled.rig.rigfile import read_rig
 

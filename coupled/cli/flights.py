@@ -54,16 +54,17 @@ if TYPE_CHECKING:
 def compare(
     run: RunArgument = DEFAULT_RUN,
     figure: Annotated[
-        Path | None, typer.Option(help="The figure: PNG, PDF or SVG. (default: out/RUN.png)")
+        Path | None,
+        typer.Option(help="File of the figure: PNG, PDF or SVG. (default: out/RUN.png)"),
     ] = None,
     json_file: JsonOption = "",
-    no_figure: Annotated[bool, typer.Option("--no-figure", help="Draw nothing.")] = False,
+    no_figure: Annotated[bool, typer.Option("--no-figure", help="Draw no figure.")] = False,
     report: ReportOption = None,
     units: UnitsOption = "si",
     panels: PanelsOption = "",
     overlay: OverlayOption = False,
     size: SizeOption = "",
-    case: Annotated[str, typer.Option(help="Case to fly, by its label; else all.")] = "",
+    case: Annotated[str, typer.Option(help="Label of the case to fly. (default: all)")] = "",
 ) -> None:
     """Fly a run rigid, uncompensated, with each correction, and with both."""
     from coupled.authority.compare import compare as compare_flights
@@ -141,16 +142,23 @@ def fly(
     run: RunArgument = DEFAULT_RUN,
     output: Annotated[
         Path | None,
-        typer.Option("--output", "-o", help="Record, CSV or Parquet. (default: out/RUN.csv)"),
+        typer.Option(
+            "--output", "-o", help="File of the record: CSV or Parquet. (default: out/RUN.csv)"
+        ),
     ] = None,
-    case: Annotated[str, typer.Option(help="Case to fly, by its label; else the first.")] = "",
+    case: Annotated[
+        str, typer.Option(help="Label of the case to fly. (default: the first case)")
+    ] = "",
     configuration: Annotated[
         str,
-        typer.Option(help="One of compare's configurations; else the rig as it is."),
+        typer.Option(
+            help="rigid, uncompensated, 'deflection only', 'gradient only', compensated or"
+            " 'calibrated low'. (default: bend and corrections as in the rig file)"
+        ),
     ] = "",
     json_file: JsonOption = "",
 ) -> None:
-    """Fly one run and write its record, and a manifest beside it."""
+    """Fly one case of a run; write its record, and a manifest beside it."""
     from coupled.authority.compare import AS_THE_RIG, fly_and_judge
     from coupled.flight.manifest import input_files
     from coupled.flight.manoeuvre import EVERY_CONFIGURATION
@@ -205,10 +213,11 @@ def _labelled(label: str, cases: Sequence[Manoeuvre], run: str) -> Manoeuvre:
 def plot(
     record: Annotated[Path, typer.Argument(help="A record, CSV or Parquet.")],
     figure: Annotated[
-        Path | None, typer.Option(help="PNG, PDF or SVG. (default: beside the record)")
+        Path | None,
+        typer.Option(help="File of the figure: PNG, PDF or SVG. (default: RECORD.png)"),
     ] = None,
 ) -> None:
-    """Draw a record."""
+    """Draw the channels of a record over time."""
     from coupled.plots.saving import check_format, save
     from coupled.record.record import check_suffix, read_record
 

@@ -35,25 +35,30 @@ def diagnose(
         list[Path],
         typer.Argument(
             metavar="RECORD...",
-            help=f"Records of one rig, {RECORDS}; or a folder whose records.toml names each's.",
+            help=f"Records of one rig, {RECORDS}; or a folder with a records.toml that names"
+            " the rig of each record.",
         ),
     ],
     rig: Annotated[
         str,
         typer.Option(
-            help="Its rig file, or the name of a shipped one. (default: the rig in the manifest"
-            " beside the record)"
+            help="The records' rig: a rig file, or the name of a shipped rig. (default: the rig"
+            " in the manifest beside the record)"
         ),
     ] = "",
     control: Annotated[
-        str, typer.Option(help="One control only. (default: all that the records move)")
+        str,
+        typer.Option(
+            help="Judge this control only: column, wheel or pedals. (default: all controls that the"
+            " records move, and the airframe)"
+        ),
     ] = "",
     healthy: Annotated[
         list[Path] | None,
         typer.Option(
             metavar="RECORD",
-            help="A record of the machine when it was well; may be given often. What differs from"
-            " those is judged.",
+            help="A record of the healthy machine; may be repeated. These records are the reference"
+            " of the diagnosis. (default: the rig file is)",
         ),
     ] = None,
     improve: Annotated[
@@ -63,40 +68,53 @@ def diagnose(
         bool,
         typer.Option(
             "--with-curves",
-            help="With --improve: write the curves, too, that describe what no effect explains.",
+            help="With --improve: also write the curves fitted where no effect explains a stage.",
         ),
     ] = False,
     plots: Annotated[
         Path | None,
         typer.Option(
             metavar="DIR",
-            help="Draw the figures ladder, stages, signature and curves there; of several controls,"
-            " those of each with a gap, and of the airframe.",
+            help="Draw ladder, stages, signature and curves into this folder: one set of"
+            " figures for each faulty control and a faulty airframe, or for all if none is faulty.",
         ),
     ] = None,
     terms: Annotated[
         bool,
         typer.Option(
-            "--terms", help="Try a factor on each named aerodynamic function of the model."
+            "--terms",
+            help="Fit a factor on each named aerodynamic function of the model, in place of the"
+            " library's aerodynamic effects.",
         ),
     ] = False,
     power: Annotated[
-        bool, typer.Option("--power", help="Say what size of each effect would have shown.")
+        bool,
+        typer.Option("--power", help="Print the smallest detectable size of each effect."),
     ] = False,
     output: Annotated[
         Path | None,
-        typer.Option(metavar="DIR", help="For a folder: where its diagnoses go, a JSON each."),
+        typer.Option(
+            metavar="DIR",
+            help="For a folder of records: folder for the diagnoses, one JSON file for each"
+            " record.",
+        ),
     ] = None,
     workers: Annotated[
         int | None,
         typer.Option(
-            "--workers", "-j", min=1, max=512, help="For a folder: processes. (default: all cores)"
+            "--workers",
+            "-j",
+            min=1,
+            max=512,
+            help="For a folder of records: number of processes. (default: one for each core)",
         ),
     ] = None,
     cluster: Annotated[
         str,
         typer.Option(
-            metavar="ADDRESS", help="For a folder: a dask scheduler's, to diagnose there."
+            metavar="ADDRESS",
+            help="For a folder of records: address of a dask scheduler, whose workers diagnose"
+            " them. (default: this computer)",
         ),
     ] = "",
     json_file: JsonOption = "",
@@ -104,7 +122,7 @@ def diagnose(
     units: UnitsOption = "si",
     wide: WideOption = False,
 ) -> None:
-    """Find where records depart from their rig, the effect behind it, and how much it explains."""
+    """Find which stages of a rig deviate from its records, by which effects, and by how much."""
     name = control_named(control, records[0]) if control else None
     if any(record.is_dir() for record in records):
         asked = {"--improve": improve, "--plots": plots, "--power": power, "--healthy": healthy}

@@ -43,36 +43,55 @@ _EXAMPLES = (
 
 @app.command(epilog=_EXAMPLES)
 def live(
-    run: Annotated[str, typer.Argument(help="A run to fly; or give --rig.")] = "",
-    rig: Annotated[str, typer.Option(help="A rig to fly without a run, until it is stopped.")] = "",
-    case: Annotated[str, typer.Option(help="Case of the run, by its label; else the first.")] = "",
+    run: Annotated[
+        str, typer.Argument(help="A run file, or the name of a shipped run; or give --rig.")
+    ] = "",
+    rig: Annotated[
+        str, typer.Option(help="A rig file, or the name of a shipped rig, to fly without a run.")
+    ] = "",
+    case: Annotated[
+        str, typer.Option(help="Label of the run's case. (default: the first case)")
+    ] = "",
     duration: Annotated[
         float | None,
         typer.Option(
-            metavar="SECONDS", help="How long; then the page closes. (default: as the run, or 7200)"
+            metavar="SECONDS",
+            help="Duration of the flight; then the page closes, too. (default: the run's, or 7200"
+            " with --rig)",
         ),
     ] = None,
     loader: Annotated[
-        str, typer.Option(metavar="URL", help="sim, udp://HOST:PORT or cls2sim://HOST:PORT.")
+        str,
+        typer.Option(
+            metavar="URL",
+            help="sim (simulated loader), udp://HOST:PORT (open protocol), or"
+            " cls2sim://HOST:PORT?WORD=VALUE&… (Brunner CLS2Sim).",
+        ),
     ] = "sim",
     hand: Annotated[
         str,
-        typer.Option(help="Who moves a simulated loader: pilot (the run's), page or stick."),
+        typer.Option(
+            help="Input that moves a simulated loader: pilot (the run's pilots), page (mouse or"
+            " keys) or stick. (default: pilot with a run, page with --rig and --dashboard)"
+        ),
     ] = "",
     axes: Annotated[
         str,
         typer.Option(
-            metavar="N,N,N", help="The stick's axes: column, wheel, pedals; a minus reverses one."
+            metavar="N,N,N",
+            help="With --hand stick: numbers of its axes for column, wheel, pedals; a minus"
+            " reverses an axis.",
         ),
     ] = _AXES,
     unmeasured: Annotated[
         bool, typer.Option("--unmeasured", help="The loader at udp:// does not measure δ.")
     ] = False,
     adapt: Annotated[
-        bool, typer.Option("--adapt", help="Let the compensation follow K as estimated in flight.")
+        bool, typer.Option("--adapt", help="Adapt the host's K̂ to the K estimated in flight.")
     ] = False,
     lockstep: Annotated[
-        bool, typer.Option("--lockstep", help="As fast as the loader answers, not in real time.")
+        bool,
+        typer.Option("--lockstep", help="Fly as fast as the loader answers, not in real time."),
     ] = False,
     dashboard: Annotated[
         bool,
@@ -82,32 +101,41 @@ def live(
         str,
         typer.Option(
             metavar="ADDRESS",
-            help="Address that serves the page; the default admits this machine only.",
+            help="With --dashboard: network address of this computer at which the page is"
+            " served; the default is reachable from this computer only.",
         ),
     ] = _HERE,
-    port: Annotated[int, typer.Option(min=0, max=65535, help="Its port; 0: a free one.")] = 0,
+    port: Annotated[
+        int, typer.Option(min=0, max=65535, help="With --dashboard: port of the page; 0: any free.")
+    ] = 0,
     flightgear: Annotated[
-        str, typer.Option(metavar="HOST:PORT", help="Send the view to FlightGear.")
+        str,
+        typer.Option(metavar="HOST:PORT", help="Send position and attitude to FlightGear, by UDP."),
     ] = "",
     xplane: Annotated[
-        str, typer.Option(metavar="HOST:PORT", help="Send the view to X-Plane, by UDP.")
+        str,
+        typer.Option(metavar="HOST:PORT", help="Send position and attitude to X-Plane, by UDP."),
     ] = "",
     force_limit: Annotated[
-        float, typer.Option(metavar="N", help="The most that a real loader is asked for.")
+        float, typer.Option(metavar="N", help="Limit of the force sent to a real loader, N.")
     ] = 600.0,
     rate_limit: Annotated[
-        float, typer.Option(metavar="N/S", help="How fast that may change.")
+        float, typer.Option(metavar="N/S", help="Limit of the rate of this force, N/s.")
     ] = 5000.0,
     output: Annotated[
         Path | None,
-        typer.Option("--output", "-o", help="Record, CSV or Parquet. (default: out/NAME.csv)"),
+        typer.Option(
+            "--output",
+            "-o",
+            help="File of the record: CSV or Parquet. (default: out/RUN.csv, or out/RIG-live.csv)",
+        ),
     ] = None,
     json_file: JsonOption = "",
 ) -> None:
-    """Fly in real time, with a loader, a hand and views attached; q or Ctrl-C ends it.
+    """Fly in real time with a real or simulated loader; q, Esc or Ctrl-C ends the flight.
 
-    The record has the format of `coupled fly`, complete up to the last frame. It grows
-    on disk while the flight goes on, so that a computer that fails leaves all but the last second.
+    The record has the format of `coupled fly`. It is written to disk each second, so a crash of
+    the computer loses at most the last second.
     """
     from coupled.live.attach import open_link, rig_live, run_live
     from coupled.live.host import Plan

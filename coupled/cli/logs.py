@@ -41,8 +41,8 @@ def import_log(
         list[Path],
         typer.Argument(
             metavar="LOG...",
-            help="A log: CSV, Parquet, MATLAB, HDF5, MDF 4, TDMS, MCAP or ULog; or several of one "
-            "test, each with stamps from one clock. The first one's rows make the frames.",
+            help="A log: CSV, JSON, Parquet, MATLAB, HDF5, MDF 4, TDMS, MCAP or ULog; or "
+            "several logs of one test, which are interpolated to the rows of the first.",
         ),
     ],
     map_file: Annotated[
@@ -50,30 +50,37 @@ def import_log(
         typer.Option(
             "--map",
             metavar="MAP.toml",
-            help="Its names, units, signs and clock; JSBSim's, FlightGear's and X-Plane's own "
-            "logs need none.",
+            help="Map of the log: names, units, signs and clock. Logs of JSBSim, FlightGear and "
+            "X-Plane need none.",
         ),
     ] = None,
     suggest: Annotated[
         Path | None,
         typer.Option(
             metavar="MAP.toml",
-            help="Write a first map, from names, units and sizes; what they leave open it asks.",
+            help="Write a first map, from the log's names, units and magnitudes; undecided "
+            'entries are "?". Convert nothing.',
         ),
     ] = None,
     output: Annotated[
         Path | None,
-        typer.Option("--output", "-o", help="Record, CSV or Parquet. (default: out/LOG.csv)"),
+        typer.Option(
+            "--output", "-o", help="File of the record: CSV or Parquet. (default: out/LOG.csv)"
+        ),
     ] = None,
     rig: Annotated[
-        str, typer.Option(help="Hold it against a rig file, or the name of a shipped one.")
+        str,
+        typer.Option(
+            help="A rig file, or the name of a shipped rig: gives the frame rate; travels and "
+            "gradients are compared with the channels."
+        ),
     ] = "",
     feel: Annotated[
         Path | None,
         typer.Option(
             metavar="CURVE.toml",
-            help="Of a slow sweep of one control, out and back, write breakout, friction and curve "
-            "too, with a plot.",
+            help="For a slow sweep of one control, out and back: also write its breakout, friction "
+            "and force curve, with a plot beside them.",
         ),
     ] = None,
     json_file: JsonOption = "",

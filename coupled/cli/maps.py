@@ -21,20 +21,28 @@ from coupled.resources import find, shipped_rigs
     name="map", epilog="[dim]Examples: coupled map 737 · coupled map t37 --record out/a.csv[/]"
 )
 def draw_map(
-    rig: Annotated[str, typer.Argument(help="A rig file, or a shipped one.")] = DEFAULT_RIG,
+    rig: Annotated[
+        str, typer.Argument(help="A rig file, or the name of a shipped rig.")
+    ] = DEFAULT_RIG,
     record: Annotated[
         list[Path] | None,
         typer.Option(
-            help="Records whose envelope is drawn (default: the rig's shipped runs, flown)."
+            help="Record whose envelope is drawn; may be repeated. (default: flights of the rig's"
+            " shipped runs)"
         ),
     ] = None,
     output: Annotated[
         Path | None,
-        typer.Option("--output", "-o", help="Figure, PNG, PDF or SVG. (default: out/RIG-map.png)"),
+        typer.Option(
+            "--output",
+            "-o",
+            help="File of the figure: PNG, PDF or SVG; CSV tables are written beside it. (default:"
+            " out/RIG-map.png)",
+        ),
     ] = None,
     units: UnitsOption = "si",
 ) -> None:
-    """Map what a rig loses over q̄ and deflection, and its stick force per g and per knot."""
+    """Map a rig's lost authority over q̄ and deflection, and stick force per g and per knot."""
     from coupled.authority.whole import map_rig
     from coupled.plots.maps import draw_feel, draw_losses
     from coupled.plots.saving import check_format, save

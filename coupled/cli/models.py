@@ -33,17 +33,23 @@ if TYPE_CHECKING:
 def models(
     names: Annotated[
         list[str] | None,
-        typer.Argument(help="Models, their files, or folders of models. (default: all known)"),
+        typer.Argument(
+            help="Names of JSBSim models, XML files, or folders of models. (default: all known)"
+        ),
     ] = None,
     workers: Annotated[
         int,
         typer.Option(
-            "--workers", "-j", help="Processes, at most one a core; 0: one a core.", min=0, max=512
+            "--workers",
+            "-j",
+            help="Number of processes, at most one for each core; 0: one for each core.",
+            min=0,
+            max=512,
         ),
     ] = 0,
     json_file: JsonOption = "",
 ) -> None:
-    """List JSBSim's models: where each trims or why not, how its controls move, its rigs."""
+    """List JSBSim models: where each trims or why not, how its controls move, its rigs."""
     from coupled.surveying.survey import chosen_models
     from coupled.surveying.whole import survey_models
 
@@ -60,20 +66,23 @@ def models(
 def terms(
     model: Annotated[
         str,
-        typer.Argument(help="A JSBSim model that is here, or the folder or file of another."),
+        typer.Argument(
+            help="Name of a JSBSim model (coupled models), or your model's folder or XML file."
+        ),
     ],
     run: Annotated[
         str,
         typer.Option(
-            help="The run whose first case is flown. (default: a doublet and a 3-2-1-1 on each"
-            " surface)"
+            help="A run file, or a shipped run, whose first case is flown. (default: a doublet"
+            " and a 3-2-1-1 on each surface)"
         ),
     ] = "",
     json_file: JsonOption = "",
 ) -> None:
-    """List the named functions of a model's aerodynamics, with axis and share of it in a flight.
+    """List the named functions of a model's aerodynamics, with axis and share in a flight.
 
-    A rig scales them by name under flight.terms.
+    The share is that of the axis's total. The table flight.terms of a rig file scales
+    them by name.
     """
     from coupled.cli.tables import print_table
     from coupled.surveying.terms import list_terms
@@ -114,42 +123,49 @@ def _print(rows: Sequence[Surveyed]) -> None:
 def rig(
     model: Annotated[
         str | None,
-        typer.Argument(help="A JSBSim model that is here, or the folder or file of another."),
+        typer.Argument(
+            help="Name of a JSBSim model (coupled models), or your model's folder or XML file."
+        ),
     ] = None,
     file: Annotated[
         Path | None, typer.Argument(help="The new rig file. (default: MODEL.toml)")
     ] = None,
     bench: Annotated[
-        bool, typer.Option("--bench", help="Without an aircraft: FILE alone; a few questions.")
+        bool,
+        typer.Option(
+            "--bench",
+            help="A control without an aircraft: give FILE only; the command asks for its numbers.",
+        ),
     ] = False,
     log: Annotated[
         Path | None,
         typer.Option(
             "--from",
             metavar="LOG",
-            help="Without an aircraft, by a log of a slow sweep and of releases: a record, or with"
-            " --map any log that coupled import takes.",
+            help="A control without an aircraft, its numbers estimated from a slow sweep and"
+            " releases in LOG: a record, or with --map any log that coupled import reads.",
         ),
     ] = None,
     map_file: Annotated[
-        Path | None, typer.Option("--map", metavar="MAP.toml", help="The log's map (--from).")
+        Path | None, typer.Option("--map", metavar="MAP.toml", help="With --from: the log's map.")
     ] = None,
     given: Annotated[
         list[str] | None,
         typer.Option(
             "--set",
             metavar="NAME=VALUE",
-            help="What is known of a control on the bench, instead of a question: travel, gradient,"
-            " breakout, friction, mass, damping, bend, servo=yes or no; as travel=4in.",
+            help="With --bench or --from: a known number, as travel=4in; may be repeated. Names:"
+            " travel, gradient, breakout, friction, mass, damping, bend, servo (yes or no).",
         ),
     ] = None,
     control: ControlOption = "column",
     airframe_only: Annotated[
-        bool, typer.Option("--airframe-only", help="The aircraft alone, without a control.")
+        bool,
+        typer.Option("--airframe-only", help="Write the aircraft alone, without controls."),
     ] = False,
     units: UnitsOption = "si",
 ) -> None:
-    """Write a first rig: for a JSBSim model, or of a control on the bench. Guesses are listed."""
+    """Write a rig file for a JSBSim model, or for a control alone; guesses are listed in it."""
     if bench or log is not None:
         if file is not None:
             problem = "give the new rig's file alone: a bench has no model"

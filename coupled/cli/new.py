@@ -18,7 +18,7 @@ from coupled.outputs import Outputs
 from coupled.record.channels import CONTROL_NAMES
 from coupled.resources import shipped_rigs, starter
 
-new = typer.Typer(no_args_is_help=True, help="Write a commented file to start from.")
+new = typer.Typer(no_args_is_help=True, help="Write a first file, with comments, to edit.")
 app.add_typer(new, name="new")
 
 
@@ -32,13 +32,13 @@ def run(
         str,
         typer.Option(
             metavar="RIG",
-            help="A rig file, or a shipped one: cases that it flies, at speeds and forces of its"
-            " own. (default: the T-37's)",
+            help="A rig file, or the name of a shipped rig: write cases at speeds where it"
+            " trims, with forces that suit it. (default: fixed cases of the T-37)",
         ),
     ] = "",
     control: ControlOption = "column",
 ) -> None:
-    """Write a run: a rig, a pilot, its cases, what is measured and expected."""
+    """Write a run file: rig, pilot, cases, measures and expectations."""
     if rig:
         check_new(file, ".toml")
         write_new(file, _run_for(rig, control, file), ".toml", f"coupled compare {word_of(file)}")
@@ -52,7 +52,7 @@ def run(
 def sweep(
     file: Annotated[Path, typer.Argument(help="The new file.")] = Path("my-sweep.toml"),
 ) -> None:
-    """Write a sweep: a run flown over two of its parameters."""
+    """Write a sweep file: a run flown over two of its parameters."""
     write_new(file, _text("sweep.toml"), ".toml", f"coupled sweep {word_of(file)}")
 
 
@@ -62,7 +62,7 @@ def sweep(
 def map_(
     file: Annotated[Path, typer.Argument(help="The new file.")] = Path("my-map.toml"),
 ) -> None:
-    """Write the map of a log: its columns as channels, with units, signs and clock."""
+    """Write a map file: channels of a log from its columns, with units, signs and clock."""
     write_new(file, _text("map.toml"), ".toml", f"coupled import LOG --map {word_of(file)}")
 
 
@@ -72,12 +72,13 @@ def map_(
 def readings(
     file: Annotated[Path, typer.Argument(help="The new file.")] = Path("my-readings.csv"),
     control: Annotated[str, typer.Option(help="column, wheel or pedals.")] = "column",
-    inches: Annotated[bool, typer.Option("--inches", help="In inches and pounds.")] = False,
+    inches: Annotated[
+        bool, typer.Option("--inches", help="Use inches and pounds. (default: m and N)")
+    ] = False,
 ) -> None:
-    """Write a form for a loader's readings, each row with what to do.
+    """Write a form for calibration readings, with an instruction in each row.
 
-    coupled calibrate --plan --write FILE makes one for a rig of your own, with the most informative
-    readings.
+    coupled calibrate --plan --write FILE writes one with the most informative readings of your rig.
     """
     from coupled.calibration.form import starting_form
 
@@ -94,15 +95,15 @@ def readings(
 )
 def feel(
     readings: Annotated[
-        Path, typer.Argument(help="CSV of deflection and force, out and back, of the aircraft.")
+        Path, typer.Argument(help="CSV of deflection and force of a sweep, out and back.")
     ],
-    file: Annotated[Path, typer.Argument(help="The new file; its plot is a PNG beside it.")] = Path(
-        "my-feel.toml"
-    ),
+    file: Annotated[
+        Path, typer.Argument(help="The new file; a plot is written beside it as PNG.")
+    ] = Path("my-feel.toml"),
     control: Annotated[str, typer.Option(help="column, wheel or pedals.")] = "column",
     units: UnitsOption = "si",
 ) -> None:
-    """Write a schedule's curve, breakout and friction from a sweep of the aircraft's control."""
+    """Write force curve, breakout and friction from a sweep of a control of the aircraft."""
     from coupled.calibration.feel import fit_feel, read_sweep
     from coupled.cli.feel import keep_feel, print_feel
 

@@ -24,7 +24,7 @@ ReportOption = Annotated[
     typer.Option(
         "--report",
         metavar="FILE.html",
-        help="Write verdict, tables, figures and settings as one HTML file, to hand on.",
+        help="Write verdict, tables, figures and settings as one self-contained HTML file.",
     ),
 ]
 

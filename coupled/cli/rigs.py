@@ -21,34 +21,41 @@ if TYPE_CHECKING:
     from coupled.rig.rig import Rig
 
 DEFAULT_RIG = "report-column"
-RigOption = Annotated[str, typer.Option(help="A rig file, or the name of a shipped one.")]
+RigOption = Annotated[str, typer.Option(help="A rig file, or the name of a shipped rig.")]
 ControlOption = Annotated[str, typer.Option(help="column, wheel or pedals.")]
 ErrorOption = Annotated[
     list[str] | None,
     typer.Option(
         "--error",
         metavar="NAME=VALUE",
-        help="Standard deviation of ruler (mm; ° on a wheel), scale (N), meter (V), or of the hand"
-        " (% of its force); may be repeated (default: ruler=0.3 scale=0.3 meter=0.01 hand=0.3;"
-        " ruler=0.2 on a wheel).",
+        help="Standard deviation of an instrument: ruler (mm; ° on a wheel), scale (N), meter (V),"
+        " hand (% of its force); may be repeated. (default: ruler=0.3, on a wheel 0.2; scale=0.3,"
+        " meter=0.01, hand=0.3)",
     ),
 ]
 StrongestOption = Annotated[
-    float, typer.Option("--strongest-N", help="The greatest force to hold, N.", min=1, max=2000)
+    float,
+    typer.Option(
+        "--strongest-N", help="Largest hand force in planned readings, N.", min=1, max=2000
+    ),
 ]
 
 
 CrossedOption = Annotated[
     float,
     typer.Option(
-        "--crossed-N", help="Force to hold with either sign on each other control, N.", min=0
+        "--crossed-N",
+        help="Add readings with this force, of both signs, on each other control, N; 0: none.",
+        min=0,
     ),
 ]
 
 
 OnceOption = Annotated[
     bool,
-    typer.Option("--once", help="Ruler and scale read once, not again after the voltmeter."),
+    typer.Option(
+        "--once", help="Read ruler and scale once per reading, not again after the voltmeter."
+    ),
 ]
 
 

@@ -21,22 +21,28 @@ from coupled.resources import find, shipped_rigs
     " · coupled stability my.toml --control wheel -o wheel.png[/]"
 )
 def stability(
-    rig: Annotated[str, typer.Argument(help="A rig file, or a shipped one.")] = DEFAULT_RIG,
+    rig: Annotated[
+        str, typer.Argument(help="A rig file, or the name of a shipped rig.")
+    ] = DEFAULT_RIG,
     control: Annotated[
-        str, typer.Option(help="column, wheel or pedals. (default: all that bend)")
+        str, typer.Option(help="column, wheel or pedals. (default: each control with a bend)")
     ] = "",
     output: Annotated[
         Path | None,
         typer.Option(
-            "--output", "-o", help="Figure, PNG, PDF or SVG. (default: out/RIG-stability.png)"
+            "--output",
+            "-o",
+            help="File of the figure: PNG, PDF or SVG; its CSV is written beside it. (default:"
+            " out/RIG-stability.png)",
         ),
     ] = None,
     json_file: JsonOption = "",
     units: UnitsOption = "si",
 ) -> None:
-    """Map where a rig is stable, simulated and by linear theory, over K·G_T.
+    """Map where a rig is stable, simulated and by linear theory.
 
-    Against the host's K̂, the frame of a digital product, the hand, the servo and the gauge.
+    One map each of K·G_T against K̂/K, the frame time of a digital product, the stiffness of the
+    hand, the servo frequency, and the bandwidth and mass of the gauge.
     """
     from coupled.authority.stability.planes import kinds_of
     from coupled.authority.stability.whole import compliant_controls, map_stability
