@@ -111,8 +111,8 @@ def test_a_force_is_said_to_move_the_hand_further(folder: Path) -> None:
     shown = [float(cell) for cell in row.split()[-2:]]
     assert shown[1] - shown[0] == pytest.approx(further, abs=0.11)
     said = " ".join(done.stdout.split())
-    assert f"the hand moves {shown[1]:.0f} mm for it instead of {shown[0]:.0f} mm" in said
-    assert "the surface goes about as far, while" in said
+    assert f"the hand moves {shown[1]:.0f} mm instead of {shown[0]:.0f} mm" in said
+    assert "the surface moves about as far, but" in said
     clamped = run.replace('kind = "step"\n', 'kind = "clamp"\n').replace(
         "force_N = 40.0", "deflection_m = 0.02"
     )

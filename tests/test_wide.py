@@ -71,6 +71,6 @@ def test_the_channels_of_a_fit_stay_a_table_at_80_columns() -> None:
     print_table(console, channels_table(channels), edge=True)
     assert isinstance(console.file, StringIO)
     text = console.file.getvalue()
-    assert "--wide shows also: it moves by" in text
+    assert "--wide shows also: channel's rms" in text
     assert "1.23e-05" in text
     assert "as filed: " not in text

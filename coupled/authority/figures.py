@@ -49,12 +49,12 @@ class Figure:
 
 
 FIGURES: tuple[Figure, ...] = (
-    Figure("asked_norm", "surface asked, % of travel", lambda x: f"{100 * abs(x):.2f}"),
+    Figure("asked_norm", "surface command, % travel", lambda x: f"{100 * abs(x):.2f}"),
     Figure("reached_norm", "surface reached, %", lambda x: f"{100 * abs(x):.2f}"),
     Figure("hand_travel_norm", "hand's travel, {unit}", lambda x: f"{abs(x):.1f}"),
     Figure("loss", "authority lost, %", lambda x: f"{100 * x:.2f}"),
     Figure("loss_closed_form", "  by closed form, %", lambda x: f"{100 * x:.2f}"),
-    Figure("felt_ratio", "felt of specified gradient", lambda x: f"{x:.3f}"),
+    Figure("felt_ratio", "felt / specified gradient", lambda x: f"{x:.3f}"),
     Figure("felt_ratio_closed_form", "  by closed form", lambda x: f"{x:.3f}"),
     Figure("force_N", "force needed, {force}", lambda x: f"{x:.1f}"),
     Figure("force_step_N", "force step, {force}", lambda x: f"{x:.2f}"),
@@ -66,12 +66,12 @@ FIGURES: tuple[Figure, ...] = (
 
 # Of the figures that a sweep keeps, over flights of any control.
 _KEPT: dict[str, str] = {
-    "asked_norm": "surface asked",
+    "asked_norm": "surface command",
     "reached_norm": "surface reached",
     "hand_travel_norm": "hand's travel",
     "loss": "authority lost",
     "loss_closed_form": "loss by closed form",
-    "felt_ratio": "felt over specified",
+    "felt_ratio": "felt / specified",
     "felt_ratio_closed_form": "felt by closed form",
     "force_N": "force needed",
     "force_step_N": "force step",
@@ -283,7 +283,7 @@ def _saturated(cases: Sequence[Sequence[Flight]]) -> Iterator[str]:
     if places:
         yield (
             f"The {surface} is at its stop from here on, counted from trim: {_some(places)}. The"
-            " hand asks for more, which the surface does not give: it is not counted as lost."
+            " hand commands more; the excess is not counted as lost."
         )
 
 
@@ -317,12 +317,12 @@ def explain_loss(case: Sequence[Flight], system: System = "si") -> str:
         for number, each in enumerate(moved[1:], start=1)
         if moves_surface_alike(each, rigid) is alike
     ]
-    surface = "the surface goes about as far, while" if alike else "and"
+    surface = "the surface moves about as far, but" if alike else "and"
     more = f" Likewise {listed(others)}." if others else ""
     return (
-        f"The pilot holds a force: {bent.configuration}, the hand moves {places[0]} for it instead"
-        f" of {places[1]}{where}, since the structure bends; {surface} {percent(bent.loss, 0)} of"
-        f" what the hand asks for is lost.{more}"
+        f"The pilot holds a force. {bent.configuration.capitalize()}, the hand moves {places[0]}"
+        f" instead of {places[1]}{where}, since the structure bends; {surface}"
+        f" {percent(bent.loss, 0)} of the hand's command is lost.{more}"
     )
 
 
@@ -348,9 +348,9 @@ def sweep_remarks(manoeuvre: Manoeuvre, configurations: Sequence[Configuration])
         said.append(_says_no_correction(manoeuvre, useless))
     if holds_force(manoeuvre) and any(_is_uncorrected(each) for each in flown.values()):
         said.append(
-            "The pilot holds a force: on a structure that bends, the hand goes further for it, and"
-            " without correction the surface goes about as far as on a rigid one. What is lost is a"
-            " share of what the hand asks for."
+            "The pilot holds a force: on a structure that bends, the hand moves further, and"
+            " without correction the surface moves about as far as on a rigid one. The loss is a"
+            " share of the hand's command."
         )
     return said
 

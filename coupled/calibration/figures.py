@@ -89,24 +89,26 @@ def remarks(found: CalibrationResult, system: System = "si") -> list[str]:
         f" {line.correlation:+.2f}",
     ]
     if np.isfinite(line.excess):
-        lines[0] += f"; {line.excess:.2f} of what the instruments explain"
+        lines[0] += f"; {line.excess:.2f} times the rms that the instruments' errors predict"
         if line.excess > LARGE:
-            lines.append("They are larger: an instrument errs more, or the bend is not straight.")
+            lines.append(
+                "They are larger: an instrument has a larger error, or the bend is nonlinear."
+            )
         elif line.excess < SMALL:
-            lines.append("They are smaller: the instruments are better than stated.")
+            lines.append("They are smaller: the instruments have smaller errors than stated.")
     if line.bend.error > 0.0:
         off = round((plain.bend.value - line.bend.value) / line.bend.error, 2) + 0.0  # no -0.00
         lines.append(
-            f"Ordinary least squares takes ruler and scale as exact, which biases it: its K is"
-            f" {off:+.2f} standard errors off. Use the fit with errors in all variables;"
-            " the ordinary one only if the voltmeter alone errs, or to compare with an old fit."
+            f"Ordinary least squares ignores the errors of ruler and scale, which biases it: its K"
+            f" differs by {off:+.2f} standard errors. Use it only if the voltmeter alone has"
+            " errors, or to compare with an older fit."
         )
     if found.s3 is None:
         lines.append("v3 was not read: S3 stays as in the rig file.")
     for s in found.suspects:
         lines.append(
             f"row {s.row} is excluded: {s.columns} is {s.deviations:.0f} standard deviations"
-            " off, mistyped?"
+            " off; is it mistyped?"
         )
     lines += _creep_lines(found, system) + _accuracy_lines(found, system) + _arc_lines(found)
     lines += [f"stale calibration in the rig file: {change}" for change in found.changed]
@@ -135,8 +137,8 @@ def _creep_lines(found: CalibrationResult, system: System) -> list[str]:
     if found.one_sided:
         lines.append(
             "The control has friction, and there are fewer than four nulls, or nulls from one side"
-            " only: the interval of S2 includes the hand's variation. Add nulls from beyond"
-            " (approach: in)."
+            " only: the interval of S2 includes the variation of the hand force. Add nulls from"
+            " the other side (approach: in)."
         )
     return lines
 

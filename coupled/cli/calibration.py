@@ -266,8 +266,8 @@ def _print_plan(plan: ReadingsPlan, system: System) -> None:
     out.print(f"\nfewest for ± {percent(half)}: {count} readings", highlight=False)
     print_table(out, plan_table(plan, system))
     out.print(
-        "\nThe softest gradient far out gives S1, the stiffest at full force K. A few readings"
-        " between them show whether the bend is straight, which the ends alone cannot."
+        "\nReadings at the softest gradient and a large deflection determine S1; those at the"
+        " stiffest gradient and full force determine K. The others test whether the bend is linear."
     )
     out.print(_deflection_line(plan.needs, count), highlight=False)
 

@@ -166,9 +166,9 @@ def diagnose(
             _print(whole, power, (None if worse else improve, drawn), units)
         say_report(report)
         if with_curves and not whole.curves:
-            say("no curve describes what the effects leave; --with-curves adds none")
+            say("no curve was fitted: --with-curves adds none to the rig")
         if worse:
-            say(f"not written: {improve}. With it the flight stays further from the record")
+            say(f"not written: {improve}, since a flight of that rig differs more from the record")
     print_json(table, json_file)
 
 
@@ -235,11 +235,11 @@ def in_words(whole: Diagnosis, system: System) -> str:
 
 
 # Reasons of keys in an improved rig that are no effect's parameters.
-_GOES_WITH = "which goes with what was found; it has no effect of its own"
+_GOES_WITH = "which an effect found needs; it has no effect of its own"
 _BESIDE = {
     "servo_damping_ratio": "since a file gives both numbers of a servo or none",
     "model_folder": "whole, since this file may lie elsewhere",
-    "guesses": "without the numbers that are found now",
+    "guesses": "without the numbers that were found",
 }
 
 

@@ -141,7 +141,7 @@ def _convert(
         keep_json(table, json_file, outputs)
     if json_file != "-":
         if program:
-            say(f"map: {program}'s own, by the log's head")
+            say(f"map: built in for {program}, recognised by the log's header")
         _print_account(account)
         say(f"record: {path}  ({len(record)} rows, {len(record.channels)} channels)")
         say(f"manifest: {manifest_path(path)}")
@@ -214,6 +214,6 @@ def _clock_in_words(clock: ClockAccount) -> str:
         steps = f"{1e3 * clock.least_step_s:.3g} to {1e3 * clock.greatest_step_s:.3g} ms"
         how = f"{steps} apart, interpolated (PCHIP)"
     else:
-        how = "even, taken as they are"
+        how = "evenly spaced, not interpolated"
     frames = f"{clock.frames} frames at {clock.frame_rate_Hz:g} Hz"
     return f"clock: {rows}, {how};\n       {frames}"

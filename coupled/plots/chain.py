@@ -109,7 +109,7 @@ def _draw_residual(axes: Any, view: View, output: Output, wide: bool) -> None:
         color="0.75",
         alpha=0.6,
         linewidth=0.0,
-        label="± 2 floors of noise",
+        label="± 2 noise floors",
     )
     if wide:
         clear = view.diagnosis.verdict == "no_gap"
@@ -122,7 +122,7 @@ def _draw_residual(axes: Any, view: View, output: Output, wide: bool) -> None:
     if not wide:
         reach = max(4.0 * factor, 1.1 * float(np.percentile(np.abs(after), 99.5)))
         axes.set_ylim(-reach, reach)
-        axes.set_title("close up: what is left", fontsize=9, loc="left")
+        axes.set_title("enlarged: remaining residual", fontsize=9, loc="left")
     axes.set_xlim(time[0], time[-1])
     axes.set_ylabel(shown.labelled("residual"), fontsize=9)
     axes.tick_params(labelsize=8)

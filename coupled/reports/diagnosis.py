@@ -26,7 +26,7 @@ from coupled.tables.table import Table, Tone
 _TONES: dict[str, Tone] = {"no_gap": "good", "ambiguous": "bad", "unexplained": "bad"}
 _CAPTIONS = {
     "ladder.png": "What was tried, and how much each effect gains; how the gap falls with it.",
-    "stages.png": "Each stage of the chain: its residual over what noise alone leaves.",
+    "stages.png": "Each stage of the chain: its residual over its noise floor.",
     "curves.png": "Functions of one signal that describe what no effect explains; no causes.",
     "signature.png": "The law of what was found, as measured, as filed, and as found.",
 }

@@ -88,13 +88,13 @@ def plan_table(plan: ReadingsPlan, system: System = "si") -> Table:
 def coverage_table(found: Coverage) -> Table:
     """Return how often the intervals of simulated benches included the true value."""
     shares = {
-        f"95 % interval of {name} holds the truth": share
+        f"95 % interval of {name} contains true value": share
         for name, share in found.covered.items()
         if not np.isnan(share)
     }
     shares |= {
         "  of K by ordinary least squares": found.ordinary_covered,
-        "K within 5 % of the truth": found.within,
+        "K within 5 % of the true value": found.within,
     }
     off = {
         "bias of K, errors in all variables": f"{100 * found.bias:+.2f} %",
@@ -102,7 +102,7 @@ def coverage_table(found: Coverage) -> Table:
         "scatter of K, errors in all variables": f"{100 * found.spread:.2f} %",
     }
     after = {
-        "a good reading taken for mistyped": found.accused,
+        "benches with a good reading excluded": found.accused,
         "compensated, deflection within 0.5 %": found.deflection,
         "compensated, felt gradient within 1 %": found.felt,
         "  both": found.circle,

@@ -26,7 +26,7 @@ _SHARES = {"least": 0.0, "5 %": 0.05, "median": 0.5, "95 %": 0.95, "greatest": 1
 
 def verdict_tables(verdicts: Sequence[Verdict], system: System = "si") -> Iterator[Table]:
     """Yield a table for each case of a run: its expectations, with figure, bounds and margin."""
-    heads = ("", "expected of", "found", "wanted", "margin")
+    heads = ("", "expectation", "found", "limits", "margin")
     for (run, case), group in groupby(verdicts, key=lambda v: (v.run, v.case)):
         rows = tuple(_verdict(verdict, system) for verdict in group)
         yield Table(heads, rows, run if run == case else f"{run}: {case}", "llr")

@@ -77,7 +77,7 @@ def _found(parameter: ParameterEstimate) -> tuple[str, str]:
 
 def stages_table(stages: Sequence[StageResult]) -> Table:
     """Return each stage's residual over its noise floor, before and with the effects found."""
-    heads = ("stage", "residual over floor", "with the effects", "")
+    heads = ("stage", "residual / floor", "with the effects", "")
     return Table(heads, tuple(map(_stage, stages)), align="lrrl")
 
 
@@ -86,8 +86,8 @@ def _stage(stage: StageResult) -> Row:
         lacks = "lacks " + ", ".join(stage.missing)
         return stage.name, "not judged", "", stage.why or lacks
     left = "" if stage.left is None else f"{stage.left:.2f}"
-    within = "within its settings" if stage.within_settings else ""
-    remark = Mark("guilty", "bad") if stage.guilty else within
+    within = "within its tolerances" if stage.within_settings else ""
+    remark = Mark("faulty", "bad") if stage.guilty else within
     return stage.name, f"{stage.gap:.2f}", left, remark
 
 
@@ -96,7 +96,7 @@ def shrink_table(
 ) -> Table:
     """Return how far the RMS residual of each channel shrinks on held-out stretches."""
     heads = ("channel", "rms as filed", by, "noise", "closed", "95 % interval")
-    caption = "The rms residual on stretches of the record that the fit has not seen"
+    caption = "The rms residual on held-out stretches of the record"
     return Table(heads, tuple(_shrink(one, system) for one in channels), caption)
 
 
@@ -119,7 +119,7 @@ def curve_table(curve: Curve, system: System = "si") -> Table:
         value, low, high = (f"{up.factor * each:.4g}" for each in values)
         rows.append((f"{across.factor * node:.4g}", value, f"{low} to {high}"))
     heads = (f"{plain(stem)}, {across.unit}", f"{curve.key}, {up.unit}", "95 % interval")
-    caption = f"A curve of the {curve.stage}, no cause; it {curve.words}"
+    caption = f"A curve fitted to the {curve.stage}, without a cause; it {curve.words}"
     return Table(heads, tuple(rows), caption, align="r", spare=("95 % interval",))
 
 
@@ -145,7 +145,7 @@ def closed_loop_table(
         label, unit = _channel(each[0].channel, system)
         numbers = (each[0].before, *(one.after for one in each))
         rows.append((label, *(f"{unit.factor * n:.3g}" for n in numbers)))
-    first = "flown again with the record's pilot, rms off by"
+    first = "flown with the record's force, rms error"
     return Table((first, "rig as filed", *heads), tuple(rows))
 
 
@@ -158,8 +158,8 @@ def in_flight_table(effects: Sequence[EffectInFlight], system: System = "si") ->
             label, unit = _channel(name, system)
             own = f"{100 * one.of_motion[name]:.3g} %"
             rows.append((*first, label, f"{unit.factor * by:.3g}", own))
-    heads = ("in flight", "share", "channel", "changes by", "of its motion")
-    return Table(heads, tuple(rows), align="lrlr", spare=("changes by", "of its motion"))
+    heads = ("effect in flight", "share", "channel", "rms change", "of its motion")
+    return Table(heads, tuple(rows), align="lrlr", spare=("rms change", "of its motion"))
 
 
 def _channel(name: str, system: System) -> tuple[str, Shown]:
@@ -170,21 +170,21 @@ def _channel(name: str, system: System) -> tuple[str, Shown]:
 
 
 def power_table(sizes: Sequence[EffectPower], system: System = "si") -> Table:
-    """Return the least size of each effect that the records would have shown."""
+    """Return the smallest detectable size of each effect."""
     rows = tuple(
         (f"{one.control} {one.name}" if one.control else one.name, one.stage, _least(one, system))
         for one in sizes
     )
-    return Table(("effect", "stage", "would have shown from"), rows, align="l", spare=("stage",))
+    return Table(("effect", "stage", "detectable from"), rows, align="l", spare=("stage",))
 
 
 def _least(one: EffectPower, system: System) -> str:
     if not one.judged:
         return "its stage is not judged"
     if not one.shows:
-        return "no size that it may have"
+        return "not at any size within its bounds"
     sizes = (size_in(name, value, system) for name, value in one.parameters)
-    return ", ".join(sizes) or "it would show"
+    return ", ".join(sizes) or "detectable"
 
 
 def next_tests_table(tests: Sequence[ProposedTest]) -> Table:
@@ -207,8 +207,8 @@ def batch_table(found: Sequence[Diagnosed]) -> Table:
         )
         for row in found
     )
-    heads = ("record", "verdict", "effects", "guilty", "closed")
-    return Table(heads, rows, align="l", spare=("guilty", "closed"))
+    heads = ("record", "verdict", "effects", "faulty", "closed")
+    return Table(heads, rows, align="l", spare=("faulty", "closed"))
 
 
 def numbers_table(numbers: Sequence[Number]) -> Table:
@@ -229,6 +229,6 @@ def channels_table(channels: Sequence[ChannelFit]) -> Table:
         (one.channel, *(f"{n:.3g}" for n in (one.before, one.after, one.floor, one.moves)))
         for one in channels
     )
-    head = "channel, rms off on stretches held out"
-    heads = (head, "as filed", "fitted", "noise alone", "it moves by")
-    return Table(heads, rows, spare=("noise alone", "it moves by"))
+    head = "channel, rms residual on held-out stretches"
+    heads = (head, "as filed", "fitted", "noise alone", "channel's rms")
+    return Table(heads, rows, spare=("noise alone", "channel's rms"))

@@ -76,7 +76,7 @@ def test_what_does_not_vary_has_no_panel_but_is_named() -> None:
     found = table(np.linspace(1e-5, 1e-4, 6), np.array([60.0, 100.0]))
     assert varying(found, ["loss", "force_step_N", "felt_ratio"]) == (
         ["loss"],
-        "the same in every flight: force step, N: 0; felt over specified, %: 100",
+        "the same in every flight: force step, N: 0; felt / specified, %: 100",
     )
     figure = draw_sweep(found, [BEND, SPEED], ["loss", "force_step_N", "felt_ratio"], "bends")
     assert len(figure.axes) == 2

@@ -94,8 +94,8 @@ def test_a_sensor_that_is_stuck_while_a_force_moves_the_control_is_named() -> No
 @pytest.mark.parametrize(
     ("low", "reliable", "said"),
     [
-        (None, False, "(from too few stretches for an interval)"),
-        (0.98, False, "(98 to 100 %, from too few stretches to rely on)"),
+        (None, False, "(too few stretches for an interval)"),
+        (0.98, False, "(98 to 100 %; too few stretches to be reliable)"),
         (-0.4, True, "(-40 to 100 %)"),
         (-0.001, True, "(0 to 100 %)"),
     ],

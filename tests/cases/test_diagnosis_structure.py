@@ -246,7 +246,7 @@ def test_a_stop_on_one_side_leaves_the_other_at_the_travel() -> None:
     sizes = {p.name: p.value for p in found.effects[0].parameters}
     assert sizes["aft_m"] == pytest.approx(0.03, rel=0.01)
     assert sizes["forward_m"] == pytest.approx(rig.controls["column"].travel)
-    assert "aft none → 0.03 m, forward none met" in found.summary
+    assert "aft none → 0.03 m, forward no limit reached" in found.summary
 
 
 def test_a_wheel_stops_in_radians_and_a_column_in_metres() -> None:

@@ -104,9 +104,13 @@ def test_two_effects_of_a_stage_share_its_gap_as_they_act_in_it(tmp_path: Path) 
         stages=tuple(loader if one.name == "loader" else one for one in found.stages),
         budget=(nothing, *found.budget),
     )
-    explained, _, rest = beside.summary.partition("of the linkage's gap; what remains is noise. ")
+    explained, _, rest = beside.summary.partition(
+        "of the linkage's gap; the remaining residual is noise. "
+    )
     assert explained.startswith(("Bend", "Backlash"))
-    assert rest.startswith("No effect of the library explains the loader's gap of 1.36 floors.")
+    assert rest.startswith(
+        "No effect of the library explains the loader's residual of 1.36 times its noise floor."
+    )
 
 
 def test_a_floor_that_an_effect_raises_is_of_its_own_power() -> None:

@@ -156,7 +156,7 @@ def test_a_curve_is_reported_and_drawn_and_no_cause(entry: PartDiagnosis) -> Non
     assert entry.curved.shrink[0].closed == pytest.approx(written["closed"])
     assert entry.curves[0].sentence.endswith("it is no cause.")
     table = curve_table(entry.curves[0], "us")
-    assert table.caption.startswith("A curve of the schedule, no cause; it closes ")
+    assert table.caption.startswith("A curve fitted to the schedule, without a cause; it closes ")
     assert table.heads[1] == "controls.column.schedule.gradient_curve, lb/in"
     assert len(draw_curves(View(entry)).axes) == 1
 

@@ -242,7 +242,7 @@ def test_diagnose_on_the_command_line(tmp_path: Path) -> None:
     words = ("diagnose", "r.csv", "--rig", "report-column", "--json", "d.json")
     done = coupled(tmp_path, *words, "--improve", "new.toml")
     assert done.returncode == 0, done.stderr
-    assert "of the linkage's gap; what remains is noise" in " ".join(done.stdout.split())
+    assert "of the linkage's gap; the remaining residual is noise" in " ".join(done.stdout.split())
     found = json.loads((tmp_path / "d.json").read_text())
     assert found["effects"][0]["parameters"]["play_m"]["value"] == pytest.approx(1e-3, rel=0.05)
     assert "# changed: loader.play_m 0 → " in (tmp_path / "new.toml").read_text(encoding="utf-8")

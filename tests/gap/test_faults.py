@@ -86,9 +86,9 @@ def test_a_stage_within_its_settings_is_told_by_its_own_limit() -> None:
         assert isinstance(console.file, io.StringIO)
         return console.file.getvalue()
 
-    assert "within its settings" in printed(1.5, 1.3)
-    assert "within its settings" not in printed(1.3, 1.1)  # within its limit as it is
-    assert "within its settings" not in printed(1.5, 1.45)
+    assert "within its tolerances" in printed(1.5, 1.3)
+    assert "within its tolerances" not in printed(1.3, 1.1)  # within its limit as it is
+    assert "within its tolerances" not in printed(1.5, 1.45)
 
 
 def folder_of(tmp_path: Path, record: Record, *names: str) -> Path:

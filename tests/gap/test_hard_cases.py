@@ -195,7 +195,10 @@ def test_what_remains_is_told_in_numbers_and_words(tmp_path: Path) -> None:
     assert linkage.remains is not None
     assert linkage.remains.gap == pytest.approx(linkage.left, rel=0.05)
     assert 0.5 < linkage.remains.free_share <= 1.0
-    assert f"the linkage with these effects is {linkage.remains.gap:.3g} floors: " in found.summary
+    assert (
+        f"the linkage with these effects is {linkage.remains.gap:.3g} times its noise floor: "
+        in found.summary
+    )
 
 
 def test_still_air_is_told_to_be_still_through_pulls_of_two_g(tmp_path: Path) -> None:

@@ -120,7 +120,7 @@ def test_a_record_without_a_state_says_what_is_not_judged(
     before = {one.channel: one.gap(rig) for one in airframe_outputs(rig, healthy)}
     for output in outputs:
         assert output.gap(rig) == pytest.approx(before[output.channel], rel=0.02)
-    said = f"Without {name} speed and attitude are not judged, which show drag and thrust."
+    said = f"Without {name}, speed and attitude are not judged: they show drag and thrust."
     assert prepare(rig, {"r": record}, Part("column")).left_out == (said,)
 
 

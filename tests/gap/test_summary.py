@@ -48,7 +48,7 @@ def test_the_first_sentence_of_an_unexplained_gap_has_the_shares_of_its_effects(
     assert "no effect of the library explains" not in text
     assert "No effect is certain: their probability is 0.30 at most." in text
     sure = said("unexplained", 300.0, 0.4, replace(FRICTION, probability=0.8))
-    assert "The effects that are certain hold less than half of the gap." in sure
+    assert "The certain effects explain less than half of the gap." in sure
 
 
 def test_a_gap_without_effects_is_said_to_have_none() -> None:
@@ -59,8 +59,8 @@ def test_a_gap_without_effects_is_said_to_have_none() -> None:
 @pytest.mark.parametrize(("left", "noise"), [(1.1, True), (7.8, False)])
 def test_what_remains_is_noise_only_within_the_limit_of_noise(left: float, noise: bool) -> None:
     text = said("effect", left, 0.999, replace(FRICTION, probability=0.9))
-    assert ("what remains is noise" in text) is noise
-    assert ("7.8 floors" in text) is not noise
+    assert ("the remaining residual is noise" in text) is noise
+    assert ("7.8 times the noise floor" in text) is not noise
 
 
 @pytest.mark.parametrize(
@@ -130,7 +130,7 @@ def test_a_stage_without_a_residual_of_its_own_is_not_said_to_leave_noise(
     shrink = Shrink(ChannelShrink("column_computed_m", 1.0, 0.1, 0.1, 4), ())
     text = summary(found, shrink, "", "", "")
     assert ("of the sensing's gap; 20 % remains." in text) is not bool(shown_in)
-    assert "sensing's gap; what remains is noise" not in text
+    assert "sensing's gap; the remaining residual is noise" not in text
 
 
 @pytest.mark.parametrize(

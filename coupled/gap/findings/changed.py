@@ -183,8 +183,8 @@ class Comparison:
             )
         each = ", ".join(f"{100.0 * size:.2g} % in the {name}" for name, size in seen.items())
         return (
-            f"By the scatter between {self.healthy} healthy records, these changes of a mean would"
-            f" have been shown, of the signal's rms: {each}."
+            f"By the scatter between {self.healthy} healthy records, a change of a mean is"
+            f" detectable from these shares of the signal's rms: {each}."
         )
 
     def as_dict(self) -> dict[str, Any]:

@@ -289,12 +289,12 @@ def in_words(effects: Sequence[EffectInFlight], credible: Collection[str]) -> st
     """
     shown = [effect for effect in effects if effect.shows]
     if not shown:
-        return "In flight it hardly shows: no channel of the motion changes by 1 %."
+        return "In flight the effect is small: no channel of the motion changes by 1 %."
     if len(effects) == 1:
         (only,) = effects
         moved = ((plain(split_unit(name)[0]), by) for name, by in only.of_motion.items())
         parts = [f"the {name} by {_per_cent(by)}" for name, by in moved]
-        return f"In flight it changes {joined(parts)} of their rms."
+        return f"In flight the effect changes {joined(parts)} of their rms."
     shares = {labelled(e.name, e.control): _per_cent(e.share) for e in effects}
     parts = [f"{label} {share}" for label, share in shares.items()]
     first = next((f" Correct {label} first." for label in shares if label in credible), "")

@@ -339,5 +339,6 @@ def in_one_line(
     if wanted:
         return wanted[0]
     if lacking:
-        return f"Record {', '.join(lacking)} too: without it stages cannot be judged."
+        them = "them" if len(lacking) > 1 else "it"
+        return f"Also record {', '.join(lacking)}: some stages cannot be judged without {them}."
     return ""

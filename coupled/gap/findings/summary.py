@@ -59,8 +59,8 @@ def filtered_words(filtered: Mapping[str, str]) -> str:
     for source in dict.fromkeys(filtered.values()):
         names = " and ".join(name for name, one in filtered.items() if one == source)
         said.append(
-            f"No noise is seen in {names}, as in a log that was filtered or resampled:"
-            f" the floor is {source}."
+            f"No noise is found in {names}, as in a filtered or resampled log:"
+            f" the noise floor is {source}."
         )
     return " ".join(said)
 
@@ -157,7 +157,8 @@ def _explained(
         return f"The gap lies in the {stage.name}."
     if not acting:
         return (
-            f"No effect of the library explains the {stage.name}'s gap of {stage.gap:.3g} floors."
+            f"No effect of the library explains the {stage.name}'s residual of"
+            f" {stage.gap:.3g} times its noise floor."
         )
     # The share of an effect that only acts beside others counts with the largest one.
     main = max(acting, key=lambda e: budget.of(e.name))
@@ -171,12 +172,12 @@ def _explained(
     said = f"{capital(' and '.join(shares))} of the {stage.name}'s gap"
     over = stage.left is not None and stage.limit is not None and stage.left > stage.limit
     if over and not stage.unexplained:
-        left = f"{_per_cent(budget.remains)} remains, {stage.left:.3g} floors"
-        return f"{said}; {left}, as the error of an effect's own physics may leave."
+        left = f"{_per_cent(budget.remains)} remains, {stage.left:.3g} times the noise floor"
+        return f"{said}; {left}, which an error of the effect's own model may cause."
     if stage.left is None and budget.remains >= MINOR:
         return f"{said}; {_per_cent(budget.remains)} remains."
     if not stage.unexplained or stage.remains is None:
-        return f"{said}; what remains is {floor}."
+        return f"{said}; the remaining residual is {floor}."
     near = stage.remains.reversals
     where = "" if near is None else f", within {1000 * near.within_s:.0f} ms of each reversal,"
     rest = f"{_per_cent(budget.remains)} remains{where}"
@@ -218,8 +219,8 @@ def _settings(found: Findings) -> str:
         off = [one.words for one in found.settings if one.stage == stage.name and one.moved]
         if off and stage.within_settings:
             said.append(
-                f"The {stage.name} is at {stage.gap:.3g} floors because of {joined(off)},"
-                " each within its tolerance, and is not faulty."
+                f"The {stage.name}'s residual is {stage.gap:.3g} times its noise floor because of"
+                f" {joined(off)}, each within its tolerance: the stage is not faulty."
             )
     return " ".join(said)
 
@@ -249,10 +250,10 @@ def _between(stage: str, where: Where) -> list[str]:
     """Return onset and end of a stage's gap, if it is not there all the time."""
     begins, ends = (f"{span.value:.1f} s" if span else "" for span in (where.begins, where.ends))
     if begins and ends:
-        return [f"The gap in the {stage} is there from {begins} to {ends}."]
+        return [f"The residual of the {stage} exceeds its noise from {begins} to {ends}."]
     if begins:
-        return [f"The gap in the {stage} is there from {begins} on."]
-    return [f"The gap in the {stage} is there until {ends}."] if ends else []
+        return [f"The residual of the {stage} exceeds its noise from {begins} on."]
+    return [f"The residual of the {stage} exceeds its noise until {ends}."] if ends else []
 
 
 def in_time(effect: EffectResult) -> str:
@@ -292,14 +293,14 @@ def _line(channel: str, line: SeenLine) -> str:
 def _remains(stage: str, left: Remains, effects: bool) -> str:
     """Return a description of the residual that remains, with the effects found if any."""
     beside = " with these effects" if effects else ""
-    said = f"The residual of the {stage}{beside} is {left.gap:.3g} floors: "
+    said = f"The residual of the {stage}{beside} is {left.gap:.3g} times its noise floor: "
     if left.follows:
         most = left.follows[0]
         follows = "is" if most.signal == "constant" else "correlates with"
         said += f"{100 * most.share:.0f} % {follows} {_signal(most.signal)}, and "
     share = round(100 * left.free_share)
     if share < 100.0 * MINOR:
-        seen = "; slow noise of a sensor would leave the same"
+        seen = "; slow noise of a sensor would look the same"
         slow = "" if left.follows or left.gap > DOUBLED else seen
         return f"{said}no function of the stage's signals predicts held-out stretches{slow}."
     of = "the stage's own signals" if left.free_in == "all" else _signal(left.free_in)
@@ -327,7 +328,7 @@ def _sure(found: Findings) -> str:
         most = max(effect.probability for effect in found.effects)
         if most < CERTAIN:
             return f"No effect is certain: their probability is {most:.2f} at most.{_undone(found)}"
-        return "The effects that are certain hold less than half of the gap."
+        return "The certain effects explain less than half of the gap."
     each = {plain(effect.name): f"{effect.probability:.2f}" for effect in found.effects}
     if len({*each.values()}) > 1:
         return f"Probabilities: {', '.join(f'{name} {p}' for name, p in each.items())}."
@@ -348,8 +349,8 @@ def closes(shrink: Shrink) -> str:
     most = shrink.widest
     if most.closed is None:
         return ""
-    few = "" if most.reliable else ", from too few stretches to rely on"
-    ends = "from too few stretches for an interval"  # or of them some without a gap
+    few = "" if most.reliable else "; too few stretches to be reliable"
+    ends = "too few stretches for an interval"  # or of them some without a gap
     if most.low is not None and most.high is not None:
         low, high = round(100 * most.low), round(100 * most.high)
         ends = ends if few and low == high else f"{low} to {high} %{few}"
@@ -385,7 +386,7 @@ def change(p: ParameterEstimate) -> str:
     """Return a parameter as filed → found (change), with its unit."""
     unit = f" {p.unit}" if p.unit else ""
     if _is_none(p):
-        return "none met"
+        return "no limit reached"
     if p.filed is None:
         return f"none → {figure(p.found)}{unit}"
     more = p.found - p.filed

@@ -323,4 +323,4 @@ def not_judged(records: Sequence[Record]) -> str:
         return ""
     fewest: tuple[str, ...] = min(each, key=len)
     names = ", ".join(fewest)
-    return f"Without {names} speed and attitude are not judged, which show drag and thrust."
+    return f"Without {names}, speed and attitude are not judged: they show drag and thrust."

@@ -27,7 +27,7 @@ def test_the_command_writes_a_record_and_prints_its_doubts(tmp_path: Path) -> No
     done = coupled(tmp_path, "import", "log.csv", "--map", "map.toml", "-o", "a/r.csv")
     assert done.returncode == 0, done.stderr
     assert max(len(line) for line in done.stdout.splitlines()) <= 80
-    assert "even, taken as they are" in done.stdout
+    assert "evenly spaced, not interpolated" in done.stdout
     np.testing.assert_allclose(read_record(tmp_path / "a/r.csv")["column_force_N"], FORCE_N)
     manifest = json.loads((tmp_path / "a/r.manifest.json").read_text())
     assert set(manifest["inputs_sha256"]) == {"log.csv", "map.toml"}

@@ -137,7 +137,7 @@ def test_the_command_says_whose_log_it_is_or_asks_for_a_map(tmp_path: Path) -> N
     (tmp_path / "Data.txt").write_text(xplane())
     done = coupled(tmp_path, "import", "Data.txt", "-o", "r.csv")
     assert done.returncode == 0, done.stderr
-    assert "map: X-Plane's own, by the log's head" in done.stdout
+    assert "map: built in for X-Plane, recognised by the log's header" in done.stdout
     (tmp_path / "own.csv").write_text("T,F\n0,1\n1,2\n2,3\n")
     refused = coupled(tmp_path, "import", "own.csv", "-o", "q.csv")
     assert (refused.returncode, refused.stderr.count("\n")) == (2, 1)

@@ -96,7 +96,7 @@ function draw() {
     ["force F", `${num(at(last, 0), 1)} N`], ["deflection δ", `${num(f * at(last, 2), 2)} ${unit}`],
     ["computed δc", `${num(f * at(last, 1), 2)} ${unit}`], ["host's δ̂", `${num(f * at(last, 3), 2)} ${unit}`],
     ["authority lost now", held ? `${num(lost, 1)} %` : "—", Math.abs(lost) > 5],
-    ["felt of specified gradient", held ? num(at(last, 0) / at(last, 2) / at(last, 4), 3) : "—"],
+    ["felt / specified gradient", held ? num(at(last, 0) / at(last, 2) / at(last, 4), 3) : "—"],
     ["F_mod", `${num(at(last, 5), 1)} N`], ["G_T", `${num(at(last, 4) / f, 3)} N/${unit}`],
     ["q̄", `${num(last[2] / 1000, 2)} kPa`], ["this frame late by", `${num(last[1], 3)} ms`],
   ]);
