@@ -108,7 +108,7 @@ def _frame_parts() -> str:
     more = [rig + rest for rig, rest in zip(part["rig"], part["rest"], strict=True)]
     return (
         f" One control adds {min(more):.1f} to {max(more):.1f} µs; a loader without aircraft"
-        f" takes {max(part['rig']):.1f}."
+        f" takes {max(part['rig']):.1f} µs."
     )
 
 
@@ -140,9 +140,9 @@ def diagnosis_seconds() -> str:
     every = kept_figures("diagnosis of 60 s of three controls").values()
     most = f" With three controls it takes up to {max(every):.1f} s." if every else ""
     return (
-        f"A record of 60 s takes {taken['none']:.1f} s without a gap, {found[quick]:.1f} s"
+        f"Diagnosis of 60 s takes {taken['none']:.1f} s without a gap, {found[quick]:.1f} s"
         f" ({quick}) to {found[slow]:.1f} s ({slow}) with one effect, and up to {unknown:.1f} s"
-        f" where none explains it {under(name)}.{most}"
+        f" if none explains it {under(name)}.{most}"
     )
 
 
