@@ -13,7 +13,7 @@ Load
     new_rig         a first rig for a JSBSim aircraft; `rig.save` writes it
     models          JSBSim's aircraft: where each trims, how its controls move
     terms           the named functions of an aircraft's aerodynamics, with their shares
-    load_run        a run file, or a shipped run by name: a `Manoeuvre` each case
+    load_run        a run file, or a shipped run by name: a `Manoeuvre` for each case
     read_record     a record of CSV or Parquet: `Record`
     write_record    the reverse, with a manifest
     import_log      a log of your own, by a map of its columns
@@ -21,9 +21,9 @@ Load
 Fly
     fly             one flight: `.record`, `.outcome`, `.ended_early`
     compare         rigid, uncompensated, each correction, both: `.loss(…)`, `.to_polars()`
-    check           runs held against what they expect
+    check           runs compared with their expectations
     sweep           a run over values of its parameters, to one table
-    Session         a flight stepped from outside: one frame, one `State`, for each `step`
+    Session         a flight in steps: each `step` flies one frame and returns the `State`
 
 Pilots, on `column`, `wheel` or `pedals`
     Step Ramp Doublet ThreeTwoOneOne FrequencySweep ForceTable     a force over time
@@ -32,13 +32,13 @@ Pilots, on `column`, `wheel` or `pedals`
     a function of the `State` that returns a force in N            your own
 
 Calibrate and diagnose
-    plan            the readings to take; `bench` takes them at a simulated rig
-    calibrate       readings to S1, S2, S3 and K, with errors; `with_calibration` puts them in a rig
-    diagnose        records to where they part from the rig, which effect, how large
+    plan            the readings to take; `bench` simulates readings
+    calibrate       S1, S2, S3 and K from readings; `with_calibration` sets them in a rig
+    diagnose        the faulty stages of a rig from records: which effect, of which size
     fit             a nominal rig to records of the healthy machine
 
-Analyse and hand on
-    map_authority   what is lost over q̄ and deflection, stick force per g and per knot
+Analyse and export
+    map_authority   authority lost over q̄ and deflection, stick force per g and per knot
     stability       where a rig is stable, over K·G_T
     document        forces and control checks of 14 CFR Part 60
     export          a rig's loader as JSBSim systems
@@ -51,10 +51,10 @@ Data
     Rig Manoeuvre PressureProfile Record InputError
 
 All is in SI; a name ends in its unit. A pull, right wheel and right pedal are positive. Input that
-cannot be used raises InputError: one line that names file and key, and what would be right.
+cannot be used raises InputError: one line with file, key and correction.
 
 Where things are: `coupled.rig` the loader and its equations, `coupled.flight` the aircraft and
-pilots, `coupled.record` channels and files, `coupled.authority` what is lost, `coupled.campaign`
+pilots, `coupled.record` channels and files, `coupled.authority` lost authority, `coupled.campaign`
 many flights, `coupled.calibration`, `coupled.gap` the diagnosis, `coupled.blind` its trials.
 Names are loaded when they are first used: `import coupled` takes no time.
 """

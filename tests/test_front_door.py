@@ -196,7 +196,7 @@ def test_a_comparison_is_asked_by_configuration_and_case() -> None:
         (lambda: fly(column=coupled.ForceTable()), "needs a file, or time_s and force_N"),
         (lambda: fly(column=coupled.ForceTable(file="no/such.csv")), "no/such.csv: cannot be read"),
         (lambda: fly(what="pull-up-t37"), "is no shipped rig; it is a shipped run"),
-        (lambda: fly(what=case(), column=PULL), "is said by the manoeuvre itself"),
+        (lambda: fly(what=case(), column=PULL), "is given by the manoeuvre itself"),
         (lambda: coupled.diagnose("t37", []), "records: needs at least one"),
         (
             lambda: coupled.diagnose("t37", "no.csv", control=STICK),

@@ -25,10 +25,10 @@ def map_authority(
     records: Given | Sequence[Given] | Mapping[str, Given] | None = None,
     progress: Progress | None = None,
 ) -> AuthorityMap:
-    """Map what a rig loses over q̄ and deflection, and its stick force per g and per knot.
+    """Map a rig's lost authority over q̄ and deflection, and its stick force per g and per knot.
 
-    `records`, as `diagnose` takes them, give the envelope that is flown; without any, the rig's
-    shipped runs are flown. Raises InputError for a record without q̄.
+    `records`, as in `diagnose`, determine the envelope that is drawn; by default the rig's shipped
+    runs are flown for it. Raises InputError for a record without q̄.
 
     >>> import coupled
     >>> found = coupled.map_authority("bench")
@@ -49,8 +49,8 @@ def stability(
 ) -> Stability:
     """Map where a rig is stable over K·G_T, simulated and by linear theory.
 
-    Of one control, or of all that bend. Some thousand motions of each are simulated, which takes
-    about a minute a control. Raises InputError where nothing bends.
+    `control` selects one control (default: each with a bend). Some thousand motions of each are
+    simulated, which takes about a minute. Raises InputError if no control has a bend.
 
     >>> import coupled
     >>> found = coupled.stability("bench")

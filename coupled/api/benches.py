@@ -40,10 +40,10 @@ def plan(
 ) -> ReadingsPlan:
     """Plan the fewest readings that give K to ± `precision` of it, 95 %.
 
-    `strongest_N` is the greatest force to hold. `once`: ruler and scale are read once, not again
-    after the voltmeter. `crossed_N` is held with either sign on each other control. `instruments`
-    are the usual ones unless given. A form to fill in is written to `file`, a CSV. Raises
-    InputError where very many readings do not do.
+    `strongest_N` is the largest hand force. `once`: ruler and scale are read once, not again after
+    the voltmeter. `crossed_N` is a force of both signs held on each other control. `instruments`
+    have default errors unless given. A form to fill in is written to `file`, a CSV. Raises
+    InputError if even very many readings do not suffice.
 
     >>> import coupled
     >>> plan = coupled.plan("report-column", precision=0.05)
@@ -93,11 +93,11 @@ def bench(
     file: str | PathLike[str] | None = None,
     **taking: Unpack[Taking],
 ) -> Readings:
-    """Take readings at a simulated rig, as a person with ruler, scale and voltmeter does.
+    """Simulate calibration readings of a rig by ruler, spring scale and voltmeter.
 
-    `gradients` sets of `deflections` readings each; with `precision`, those that a plan wants for K
-    to ± that share. `file` gets the readings, a CSV. `calibrate` takes what is returned. Raises
-    InputError where the rig lacks the control.
+    `gradients` sets of `deflections` readings each; with `precision`, those of a plan that
+    determines K to ± that share. The readings are written to `file`, a CSV. `calibrate` accepts the
+    result. Raises InputError if the rig lacks the control.
 
     Further keywords: `nulls` for S2 (6); `once`, `crossed_N`, `strongest_N` and `instruments` as
     `plan` has them.

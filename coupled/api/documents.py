@@ -31,12 +31,13 @@ def document(
     folder: str | PathLike[str] | None = None,
     progress: Progress | None = None,
 ) -> ForceDocument:
-    """Document a rig's forces, and hold them against the control checks of 14 CFR Part 60.
+    """Document a rig's forces, and compare them with the control checks of 14 CFR Part 60.
 
-    Of one control, or of all. `readings` are a file of them, of the first control (a virtual
-    bench's unless given); `specified` is a rig with the specification, `aircraft` a CSV of the
-    aircraft's own forces. `date` and `revision` are printed as given. The pages, PNG and PDF, are
-    written into `folder` where one is given. Raises InputError for a file that cannot be used.
+    `control` selects one control (default: all). `readings` is a file of readings of the first
+    control (simulated ones by default); `specified` is a rig with the specified values, `aircraft`
+    a CSV of forces measured on the aircraft. `date` and `revision` are printed as given. The pages,
+    PNG and PDF, are written into `folder` if given. Raises InputError for a file that cannot be
+    used.
 
     >>> import coupled
     >>> coupled.document("bench")

@@ -30,11 +30,11 @@ def export(
 ) -> Export:
     """Write a rig's loader as JSBSim systems, with the aircraft and scripts that JSBSim flies.
 
-    `folder` is new, or a former export. `runs` get a script each (the shipped runs of the rig's
+    `folder` is new, or an earlier export. `runs` get a script each (the shipped runs of the rig's
     name unless given); with `case` the rig is exported as that case of them has it.
-    `loader_rate_Hz` is the least rate of the loader. With `check` each script is flown by JSBSim
-    alone: `.beside` has how far each flight is from our own, `.within` whether all are near enough.
-    Raises InputError for what an export cannot express, naming the key.
+    `loader_rate_Hz` is the minimum rate of the loader. With `check` each script is flown in JSBSim
+    alone: `.beside` has the differences from the flights of `coupled`, `.within` whether all are
+    within tolerance. Raises InputError, with the key, for what cannot be exported.
 
     >>> import coupled, tempfile
     >>> with tempfile.TemporaryDirectory() as folder:

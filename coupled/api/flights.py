@@ -69,12 +69,12 @@ def fly(
 ) -> Flight:
     """Fly a rig under a pilot on each control given, and return the flight.
 
-    `what` is a rig, its file, the name of a shipped one, or a manoeuvre, which says all the
-    rest itself. A pilot is `Step`, `Ramp`, `Doublet`, `ThreeTwoOneOne`, `FrequencySweep`,
-    `ForceTable`, `Clamp`, `Attitude` or `Track`. A pull, right wheel and right pedal are
-    positive. `configuration` is `rigid`, `uncompensated`, `deflection only`, `gradient only`,
-    `compensated` or `calibrated low`; without it the rig flies as it is. `progress` is called
-    with frames done and frames in all.
+    `what` is a rig, its file, the name of a shipped one, or a manoeuvre, which has all other
+    arguments itself. A pilot is `Step`, `Ramp`, `Doublet`, `ThreeTwoOneOne`, `FrequencySweep`,
+    `ForceTable`, `Clamp`, `Attitude` or `Track`. A pull, right wheel and right pedal are positive.
+    `configuration` is `rigid`, `uncompensated`, `deflection only`, `gradient only`, `compensated`
+    or `calibrated low`; without it the rig flies as it is. `progress` is called with frames done
+    and frames in all.
 
     A pilot may also be a function of the `State` at t_k, called once a frame; it returns the force
     over the frame, N. `gradient` is a function of the state that returns G_T, N per m (rad on a
@@ -125,10 +125,10 @@ def compare(
     those that `fly` takes, the first five unless given. `progress` is called with what is flown,
     frames done and frames in all.
 
-    The `Comparison` is a sequence of `Flight`; `.loss("uncompensated")` is the share of the
-    surface command lost, `.felt_ratio(…)` force felt over force specified, `.flight(…)` the
-    flight; of several cases each takes a case's label too. `.to_polars()` and `.to_pandas()`
-    give a row a flight. Raises InputError as a run file would.
+    The `Comparison` is a sequence of `Flight`; `.loss("uncompensated")` is the share of the surface
+    command lost, `.felt_ratio(…)` force felt over force specified, `.flight(…)` the flight; with
+    several cases each also takes the label of a case. `.to_polars()` and `.to_pandas()` have a row
+    for each flight. Raises InputError as a run file would.
 
     >>> import coupled
     >>> pull = coupled.Clamp(deflection_m=0.03)
@@ -218,9 +218,9 @@ def _alone(
     gradient: Gradients | None,
     terms: Terms,
 ) -> None:
-    """Refuse keywords beside a manoeuvre, which says all itself."""
+    """Refuse keywords with a manoeuvre, which has all values itself."""
     alone = {"duration_s": duration_s, "gradient": gradient}
     given = [*pilots, *(key for key, value in alone.items() if value is not None), *terms]
     if given:
-        problem = "is said by the manoeuvre itself; change it by dataclasses.replace"
+        problem = "is given by the manoeuvre itself; change it by dataclasses.replace"
         raise InputError(manoeuvre.file, given[0], problem)

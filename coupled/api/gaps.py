@@ -31,22 +31,22 @@ def diagnose(
 ) -> Diagnosis:
     """Diagnose a mismatch between simulation and record: where, which effect, how large.
 
-    `rig` is the rig that the records should be of: a rig, its file, or the name of a shipped
-    one; None for that of the manifest beside the records. Its aircraft is trimmed as the records
-    begin. `records` is one record or several of that rig, as `Record`, as a DataFrame, as files, or
-    by name; each needs `time_s` and what its stages need (force and deflections of the control, q̄).
-    `control` restricts it to one; None judges every control that rig and records have and that
-    moves. `healthy` are records of the machine when it was well; what differs from those is judged.
-    With `terms`, the named functions of the model's aerodynamics are tried in place of the effects
+    `rig` is the records' rig: a rig, its file, or the name of a shipped rig; None for that of the
+    manifest beside the records. Its aircraft is trimmed at the records' initial condition.
+    `records` is one record or several of that rig, as `Record`, as a DataFrame, as files, or by
+    name; each needs `time_s` and what its stages need (force and deflections of the control, q̄).
+    `control` selects one control; None judges every control that rig and records have and that
+    moves. `healthy` are records of the healthy machine, the reference if given. With `terms`,
+    factors on the named functions of the model's aerodynamics are fitted in place of the effects
     that scale its aerodynamics: the effect `term NAME` is a factor on the function NAME.
 
     `found.verdict` is `no_gap`, `effect`, `mostly`, `ambiguous` or `unexplained`;
     `found.effects` are the effects, each with its parameters, their values and 95 % intervals;
-    `found.budget` shares each guilty stage's residual out to them, to what no effect explains,
-    and to noise; `found.improved` is the rig with them; `found.as_dict()` the JSON of the command
-    line. `found.controls` are the judged controls; of several, an effect has its `control`, and
-    `found.parts` are the diagnoses of each control and of the airframe. Raises InputError where
-    records and rig cannot be held against each other.
+    `found.budget` divides the residual of each faulty stage among them, an unexplained part and
+    noise; `found.improved` is the rig with them; `found.as_dict()` the JSON of the command line.
+    `found.controls` are the judged controls; with several, an effect has its `control`, and
+    `found.parts` are the diagnoses of each control and of the airframe. Raises InputError if
+    records and rig cannot be compared.
 
     >>> import coupled
     >>> rig = coupled.load_rig("t37")
@@ -82,12 +82,12 @@ def fit(
     control: ControlName = "column",
     progress: Callable[[str, int, int], None] | None = None,
 ) -> NominalFit:
-    """Fit the numbers of a rig to records of the healthy machine, and say what is undetermined.
+    """Fit a rig to records of the healthy machine, and list the undetermined parameters.
 
-    `rig` is where the fit begins, `records` as `diagnose` takes them. `free` are keys of the
-    control, as `loader.mass_kg`; without any, those that the records judge. `found.rig` is the
+    `rig` is the rig to start from, `records` are as in `diagnose`. `free` are keys of the control,
+    as `loader.mass_kg`; by default those that the channels of the records allow. `found.rig` is the
     fitted rig, whose `tolerance` holds half of each 95 % interval; `found.to_polars()` has the
-    numbers. Raises InputError where records and rig cannot be held against each other.
+    numbers. Raises InputError if records and rig cannot be compared.
 
     >>> import coupled
     >>> heavy = coupled.load_rig("t37").changed({"controls.column.loader.mass_kg": 7.0})

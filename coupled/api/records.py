@@ -62,13 +62,12 @@ def import_log(
 ) -> tuple[Record, ImportAccount]:
     r'''Return the record of a log of your own, and the account of how it was made.
 
-    Several logs of one test, each with stamps from one clock, make one record: the first one's
-    rows make the frames.
+    Several logs of one test, with stamps of one clock, are interpolated to the rows of the first.
 
-    `log_map` is a TOML file that names the log's columns and their units; JSBSim's, FlightGear's
-    and X-Plane's own logs are known by their heads, and need none. `rig` gives the frame
-    rate that the record is laid on. The account has `.clock`, `.channels`, `.unmapped` and
-    `.warnings`. Raises InputError, naming file, column and row.
+    `log_map` is a TOML file that names the log's columns and their units; logs of JSBSim,
+    FlightGear and X-Plane are recognised by their headers and need none. `rig` gives the record's
+    frame rate. The account has `.clock`, `.channels`, `.unmapped` and `.warnings`. Raises
+    InputError, naming file, column and row.
 
     >>> import coupled, tempfile, pathlib
     >>> columns = """

@@ -48,8 +48,8 @@ def models(
 ) -> Survey:
     """Return where JSBSim's models trim or why not, how their controls move, and their rigs.
 
-    `names` are some of the models that are here, or folders of others; all that are here without.
-    `workers` are processes, 0 for one a core. Raises InputError for a model that is not there.
+    `names` are names of models, or folders of others (default: all known models). `workers` is the
+    number of processes, 0 for one for each core. Raises InputError for a model that is not found.
 
     >>> import coupled
     >>> found = coupled.models(["T37"])
@@ -70,7 +70,7 @@ def terms(
     `flight.terms` of a rig scales them by name. The share is the RMS of a function over that of all
     named functions of its axis, in the first case of a `run`; by default in a flight with a doublet
     and a 3-2-1-1 on each surface. `model` is as in `new_rig`. Raises InputError for a model that is
-    not here, does not trim or has no named functions, and for a run of another model.
+    not found, does not trim or has no named functions, and for a run of another model.
 
     >>> import coupled
     >>> found = coupled.terms("c172p")
@@ -82,12 +82,12 @@ def terms(
 
 @public
 def new_rig(model: str | PathLike[str], name: str = "", *, airframe_only: bool = False) -> Rig:
-    """Return a first rig for a JSBSim model: where it trims, found; its loader, guessed.
+    """Return a first rig for a JSBSim model: its trim is computed, its loader guessed.
 
-    `model` is one that is here, or the folder of another, or its file. `name` is the rig's, by
-    default the model's. `airframe_only`: it has no control. The file that `save` writes marks each
-    guess. Raises InputError for a model that is not here, does not trim, or has no control that a
-    rig can move.
+    `model` is the name of a known model, or the folder or XML file of another. `name` is the rig's,
+    by default the model's. `airframe_only`: it has no control. The file that `save` writes marks
+    each guess. Raises InputError for a model that is not found, does not trim, or has no control
+    that a rig can move.
 
     >>> import coupled
     >>> rig = coupled.new_rig("T37", "mine")

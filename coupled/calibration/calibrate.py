@@ -43,8 +43,8 @@ def calibrate(
     """Return S₁ in V/d, S₂ and S₃ in V/N and K in d/N of a control, with their errors.
 
     `readings` are an object or a file; `rig` is an object, a file, or the name of a shipped rig.
-    The rig's travel, arc, gains and schedule are used, not its scales. `instruments` are by
-    default those of a careful person. d is m, or rad for a wheel; a pull is positive. Raises
+    The rig's travel, arc, gains and schedule are used, not its scales. `instruments` have by
+    default the errors of a careful person. d is m, or rad for a wheel; a pull is positive. Raises
     InputError, with file and row, if the readings are insufficient.
 
     >>> import coupled

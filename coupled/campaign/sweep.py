@@ -91,13 +91,13 @@ def sweep(
 ) -> SweepResult:
     """Fly a run over values of its parameters, and return a row for each flight.
 
-    `plan` is a sweep file, the name of a shipped one, or the tables of one. In `folder` each
-    flight is stored when it is done, and a later call continues there; by default nothing is
-    stored. `workers` are processes (default: all cores; 1 flies in this process), `cluster` the
-    address of a dask scheduler. `progress` is called with a text, flights done and to do; `begun`
-    once, with the flights in the folder and those of the sweep. A function on `column`, `wheel` or
-    `pedals` is the pilot in place of the run's, as in `fly`; it must be one that can be pickled.
-    Raises InputError for an invalid sweep, or a folder with another.
+    `plan` is a sweep file, the name of a shipped one, or the tables of one. Each flight is stored
+    in `folder` when it is done, and a later call resumes there; by default nothing is stored.
+    `workers` are processes (default: all cores; 1 flies in this process), `cluster` the address of
+    a dask scheduler. `progress` is called with a text, flights done and to do; `begun` once, with
+    the flights in the folder and those of the sweep. A function on `column`, `wheel` or `pedals` is
+    the pilot in place of the run's, as in `fly`; it must be one that can be pickled. Raises
+    InputError for an invalid sweep, or a folder with another.
 
     >>> import coupled
     >>> bends = {"key": "rig.controls.column.loader.bend_m_per_N", "values": [1e-5, 9e-5]}

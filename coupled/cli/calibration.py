@@ -273,10 +273,10 @@ def _print_plan(plan: ReadingsPlan, system: System) -> None:
 
 
 def _deflection_line(needs: DeflectionNeeds, readings: int) -> str:
-    """Return what the readings give of the deflection, and what it takes to have it right."""
+    """Return the error of δ̂ after these readings, and what reaches the wanted error."""
     wanted = f"{100 * needs.wanted:g} %"
-    text = "Compensated with these, the aircraft gets the deflection to"
-    text += f" {100 * needs.half_width:.2g} % (95 %)."
+    text = "In a rig compensated with these readings, the error of δ̂ is at most"
+    text += f" {100 * needs.half_width:.2g} % of δ (95 %)."
     if needs.half_width <= needs.wanted:
         return text
     ways = []
@@ -285,6 +285,8 @@ def _deflection_line(needs: DeflectionNeeds, readings: int) -> str:
     if needs.ruler is not None:
         ways.append(f"these {readings} with a ruler {needs.ruler:.2g} times finer")
     elif needs.all is not None:
-        better = f"{needs.all:.2g} times better"
-        ways.append(f"these {readings} with every instrument and the hand {better}")
-    return f"{text} For {wanted} it takes {', or '.join(ways) or 'more than readings give'}."
+        smaller = f"{needs.all:.2g} times smaller"
+        ways.append(f"these {readings} with all errors of instruments and hand {smaller}")
+    if not ways:
+        return f"{text} No number of readings reaches {wanted}."
+    return f"{text} {wanted} requires {', or '.join(ways)}."

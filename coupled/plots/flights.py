@@ -251,7 +251,9 @@ def _draw_surface(axes: Any, case: Sequence[Flight]) -> None:
     record = case[-1].record
     deflection = true_deflection(case[-1].manoeuvre.rig, control, record)
     asked = 100.0 * np.clip(share_of_travel(data, deflection), -1.0, 1.0)
-    axes.plot(record.time_s, asked, color="0.65", linewidth=3.5, zorder=0, label="asked, specified")
+    axes.plot(
+        record.time_s, asked, color="0.65", linewidth=3.5, zorder=0, label="commanded, specified"
+    )
     stop = next((s for f in case if (s := f.outcome.surface_stop_norm) is not None), None)
     if stop is not None:
         label = f"{data.surface} at its stop"
@@ -310,7 +312,7 @@ def _draw_force(axes: Any, case: Sequence[Flight], system: System) -> None:
     line = deflection[peak] * np.append([0.0, 1e-9], np.linspace(0.0, 1.0, _POINTS)[1:])
     pressure = float(record["dynamic_pressure_Pa"][peak])
     wanted = specified_force(case[0].manoeuvre.rig, control, pressure, line)
-    style = {"color": "0.65", "linewidth": 4.5, "zorder": 0, "label": "asked, specified"}
+    style = {"color": "0.65", "linewidth": 4.5, "zorder": 0, "label": "commanded, specified"}
     axes.plot(shown.factor * line, newtons.factor * wanted, **style)
     axes.set_xlabel(shown.labelled(f"true deflection of the {control}"))
     axes.set_ylabel(newtons.labelled("pilot's force"))

@@ -42,7 +42,7 @@ def draw_ladder(view: View) -> Figure:
             _draw_round(axes, view, k, rounds, gaps)
         _finish_gains(left, grid[:, 0], rounds)
     else:
-        _say(left.subplots(), "No stage stands clear of its floor:\nno effect was tried.")
+        _say(left.subplots(), "No stage exceeds its noise floor:\nno effect was fitted.")
     rungs, table = right.subplots(2, 1, height_ratios=[3.0, max(1.0, 0.3 * (len(numbers) + 1))])
     _draw_rungs(rungs, view, gaps)
     _draw_numbers(table, numbers)

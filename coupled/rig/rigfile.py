@@ -44,10 +44,10 @@ def _placed(flight: Any, file: object) -> Any:
         folder = (base / given).resolve()
         there = not isinstance(name, str) or (folder / wanted).is_file()
     except (OSError, ValueError):  # not a valid name of a folder
-        problem = "is no name of a folder; give the folder that the model's lies in"
+        problem = "is no name of a folder; give the folder that contains the model's folder"
         raise InputError(file, "flight.model_folder", problem) from None
     if not there:
-        problem = f"{given!r} holds no {wanted}; give the folder that the model's lies in"
+        problem = f"{given!r} contains no {wanted}; give the folder that contains the model's"
         raise InputError(file, "flight.model_folder", problem)
     return {**flight, "model_folder": str(folder)}
 

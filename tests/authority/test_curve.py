@@ -46,7 +46,7 @@ def test_the_authority_lost_and_the_force_felt_are_the_closed_form_to_a_thousand
     assert flown.felt_ratio("uncompensated") == pytest.approx(felt, rel=1e-3)
     assert flown.felt_ratio("compensated") == pytest.approx(1.0, rel=1e-3)
     (panel,) = (a for a in draw_comparison(flown).axes if a.get_ylabel() == "pilot's force, N")
-    (drawn,) = (one for one in panel.get_lines() if one.get_label() == "asked, specified")
+    (drawn,) = (one for one in panel.get_lines() if one.get_label() == "commanded, specified")
     at, force = np.asarray(drawn.get_xdata(), float) / 100.0, np.asarray(drawn.get_ydata(), float)
     beyond = at > 0.0  # from the first point, the breakout
     assert np.min(at[beyond]) < 1e-6

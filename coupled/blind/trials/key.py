@@ -116,7 +116,7 @@ def read_seal(path: Path) -> Seal:
     check_format(table.get("format"), SEAL_FORMAT, path, "seal")
     kept = read_as(KeptSeal, table, path)
     if kept.trials not in KNOWN:
-        problem = f"this coupled knows trials of version {', '.join(map(str, KNOWN))}"
+        problem = f"is {kept.trials}; this version of coupled has {', '.join(map(str, KNOWN))}"
         raise InputError(path, "trials", problem)
     return Seal(kept.key_sha256, kept.trials, kept.records, kept.rigs)
 

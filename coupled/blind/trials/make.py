@@ -185,11 +185,11 @@ def _finished(places: Places, asked: Numbers, any_seed: bool) -> Numbers | None:
         return None
     seal = read_seal(seal_file)
     if seal.records is None or seal.rigs is None:
-        problem = "holds a set of an older coupled, which does not say its numbers"
+        problem = "contains trials of an older version, whose seal lacks records and rigs"
         raise InputError(places.folder, "", f"{problem}; give a new folder")
     if not places.key.is_file():
         problem = f"holds a finished set, whose key is not {places.key}"
-        raise InputError(places.folder, "", f"{problem}; say --key, or give a new folder")
+        raise InputError(places.folder, "", f"{problem}; give --key, or a new folder")
     if digest(read_text(places.key, "the key of coupled blind make is wanted")) != seal.key_sha256:
         raise InputError(places.key, "", f"is not the key that {seal_file} seals")
     made = Numbers(read_key(places.key).seed, seal.records, seal.rigs, seal.version)

@@ -213,8 +213,8 @@ def _own_rate(
             if frame is not None and np.median(np.diff(frame)) == 1.0:
                 return rate, frame
     steps_ms = 1e3 * np.diff(time_s)
-    problem = f"its rows come unevenly, {steps_ms.min():.4g} to {steps_ms.max():.4g} ms apart"
-    near = f"; say what the record is to have, as clock.frame_rate_Hz = {guesses[0]:.4g}"
+    problem = f"its rows are unevenly spaced, {steps_ms.min():.4g} to {steps_ms.max():.4g} ms apart"
+    near = f"; give the record's rate, as clock.frame_rate_Hz = {guesses[0]:.4g}"
     raise InputError(log.file, "", problem + near)
 
 

@@ -34,7 +34,7 @@ def read_logs(files: Sequence[Path], log_map: LogMap, map_file: Path) -> dict[st
             raise InputError(file, "", "has the name of another log given: rename one of them")
         logs[file.name] = read_log(file, log_map.log)
     if len(logs) > 1 and not log_map.clock.source:
-        problem = "is needed where several logs are given: their stamps say how they lie"
+        problem = "is needed for several logs, which are aligned by their time stamps"
         raise InputError(map_file, "clock.from", problem)
     parts = [part for log in logs.values() for part in _parts(log, logs, log_map, map_file)]
     names = [*logs, *(part.name for part in parts)]
