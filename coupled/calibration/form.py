@@ -61,11 +61,14 @@ def starting_form(control: str, inches: bool = False) -> str:
     lines = [heads]
     for label in ("softest", "stiffest"):
         for load in _STARTING_LOADS:
-            where = f"{label} gradient: pull to {100 * load:.0f} % of what travel or strength allow"
-            where += "; ruler and scale; the voltmeter; ruler and scale again"
+            where = (
+                f"{label} gradient: pull to {100 * load:.0f} % of the largest pull that travel and"
+            )
+            where += " strength allow; read ruler and scale; voltmeter; ruler and scale again"
             lines.append(f"{label},,,,,,,,,{where}")
     for approach in ("out", "in", "out", "in"):
-        way = "" if approach == "out" else " from further out"
-        what = f"null: pull and note v1 and v3 without v2; then let v2 bring v1 back{way}"
+        way = "raise v2 until v1 has its noted value"
+        way = way if approach == "out" else "raise v2 until v1 exceeds it; lower v2 to the noted v1"
+        what = f"null: with v2 = 0 pull and note v1 and v3; release; {way}; note v2"
         lines.append(f"stiffest,,,,,,,,{approach},{what}")
     return "\n".join(lines) + "\n"

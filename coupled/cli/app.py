@@ -134,7 +134,7 @@ def _run() -> int:
         words = " ".join(error.format_message().split()).replace("Value error, ", "")
         if not words:  # a group without a command: its help has been printed
             return 0
-        line = shown(words, 400) + " (coupled --help shows what there is)"
+        line = shown(words, 400) + " (see coupled --help)"
     except (OSError, MemoryError) as error:
         line = error_text(error)
     with contextlib.suppress(OSError):

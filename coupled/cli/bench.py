@@ -76,7 +76,8 @@ def bench(
         ),
     ] = None,
     inches: Annotated[
-        bool, typer.Option("--inches", help="Write inches and pounds. (default: m and N)")
+        bool,
+        typer.Option("--inches", help="Write in (on a wheel °) and lb. (default: m or °, and N)"),
     ] = False,
     perfect: Annotated[bool, typer.Option("--perfect", help="Simulate no errors.")] = False,
     repeat: Annotated[

@@ -73,7 +73,8 @@ def readings(
     file: Annotated[Path, typer.Argument(help="The new file.")] = Path("my-readings.csv"),
     control: Annotated[str, typer.Option(help="column, wheel or pedals.")] = "column",
     inches: Annotated[
-        bool, typer.Option("--inches", help="Use inches and pounds. (default: m and N)")
+        bool,
+        typer.Option("--inches", help="Use in (on a wheel °) and lb. (default: mm or °, and N)"),
     ] = False,
 ) -> None:
     """Write a form for calibration readings, with an instruction in each row.
