@@ -112,4 +112,4 @@ def _print(fitted: NominalFit) -> None:
             say(number.words)
     for number in fitted.numbers:
         if number.at_bound:
-            say(f"at the end of what it may be: {number.key}")
+            say(f"at the bound of its range: {number.key}")

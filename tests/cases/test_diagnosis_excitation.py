@@ -105,7 +105,7 @@ def test_stretches_without_a_gap_give_no_interval(
 ) -> None:
     high = None if low is None else 1.0
     one = ChannelShrink("x", 1.0, 0.0, 0.0, 3, closed=1.0, low=low, high=high, reliable=reliable)
-    assert closes(Shrink(one, (one,))) == f"It closes 100 % of the gap on held-out data {said}."
+    assert closes(Shrink(one, (one,))) == f"On held-out data 100 % of the gap is closed {said}."
 
 
 @pytest.mark.parametrize("lacks", ["computed", "estimate"])

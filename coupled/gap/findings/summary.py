@@ -354,7 +354,7 @@ def closes(shrink: Shrink) -> str:
     if most.low is not None and most.high is not None:
         low, high = round(100 * most.low), round(100 * most.high)
         ends = ends if few and low == high else f"{low} to {high} %{few}"
-    return f"It closes {100 * most.closed:.0f} % of the gap on held-out data ({ends})."
+    return f"On held-out data {100 * most.closed:.0f} % of the gap is closed ({ends})."
 
 
 def _effect(effect: EffectResult) -> str:
