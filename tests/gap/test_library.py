@@ -163,4 +163,4 @@ def test_the_guide_counts_the_effects() -> None:
     text = (Path(__file__).parents[2] / "docs" / "guides" / "diagnose.md").read_text(
         encoding="utf-8"
     )
-    assert f"its cause among {len(EFFECTS)} effects" in text
+    assert f"one of {len(EFFECTS)} effects" in text
