@@ -80,7 +80,8 @@ class Feel:
     `force` in N has a row for each of `pressure` in Pa, over `deflection` in d. `zero_N` is the
     constant part of the forces, which the curve lacks. `rms_N` is that of the residual; `used` are
     the readings used. `straight` is the deflection up to which the curve is taken as straight,
-    because too few readings are nearer to neutral; 0 if there are enough.
+    because too few readings are nearer to neutral; 0 if there are enough. `by_pressure` are
+    breakout and friction in N at each pressure, shape (pressures, 2), if they differ; else empty.
     """
 
     breakout_N: float
@@ -95,6 +96,7 @@ class Feel:
     straight: float
     sweep: Sweep
     used: NDArray[np.bool_]
+    by_pressure: Floats
 
     def doubts(self, control: ControlName) -> list[str]:
         """Return doubts about the forces, and about a curve that does not follow them."""
@@ -109,6 +111,13 @@ class Feel:
         if self.straight:
             problem = f"breakout: is right if the curve is straight up to {self.straight:.3g}"
             found.append(f"{problem} {unit_of(control)}; give readings nearer to neutral")
+        if len(self.by_pressure):
+            each = (
+                f"{breakout:.3g} and {friction:.3g} N at {q:g} Pa"
+                for q, (breakout, friction) in zip(self.pressure, self.by_pressure, strict=True)
+            )
+            problem = f"breakout and friction depend on q̄: {', '.join(each)}"
+            found.append(f"{problem}; a rig file has one value of each, here those of all readings")
         return found
 
     def at(self, deflection: Floats, row: int, motion: float) -> Floats:
@@ -361,6 +370,20 @@ class _Fit:
                     return True
         return False
 
+    def _by_pressure(self, nodes: Sequence[float]) -> Floats:
+        """Return breakout and friction at each q̄, if their evidence is very strong; else empty."""
+        design, pressure = self._design(nodes), self._sweep.pressure[self._used]
+        each = [design[:, k] * (pressure == q) for q in self._pressures for k in range(2)]
+        split = np.column_stack((*each, design[:, 2:]))
+        values, _ = nnls(split, self._force)
+        residual, count = self._force - split @ values, len(self._force)
+        least = (EXACT * float(np.max(np.abs(self._force)))) ** 2
+        _, common = self._solve(nodes)
+        gain = count * np.log((np.mean(common**2) + least) / (np.mean(residual**2) + least))
+        more = (len(each) - 2) * np.log(count)
+        found = values[: len(each)].reshape(-1, 2)
+        return found if gain > more + VERY_STRONG else found[:0]
+
     def feel(self) -> Feel:
         """Return the fit: the constants with the segments at neutral divided, then the curve."""
         zero = self._nodes.index(0.0)
@@ -390,7 +413,7 @@ class _Fit:
             *(self._pressures, np.array(self._nodes), force),
             float(np.sqrt(residual @ residual / freedom)),
             float(values[2] - values[3]) if count > 2 else 0.0,
-            *(straight, self._sweep, self._used),
+            *(straight, self._sweep, self._used, self._by_pressure(nodes)),
         )
 
 

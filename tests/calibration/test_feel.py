@@ -75,6 +75,23 @@ def test_a_columns_breakout_friction_and_five_segments_are_recovered(tmp_path: P
         assert theirs == pytest.approx(ours, abs=1.0)
 
 
+def test_breakout_and_friction_that_depend_on_the_pressure_are_doubtful(tmp_path: Path) -> None:
+    """Of 12 and 18 N at two pressures the breakout was 14.75 N ± 0.36 N, without a word."""
+    path = column_sweep(tmp_path)
+    assert not len(fitted(path).by_pressure)
+    head, *rows = path.read_text(encoding="utf-8").splitlines()
+    lines = [head]
+    for row in rows:
+        pressure, at, felt = map(float, row.split(","))
+        lines.append(f"{pressure},{at},{1.5 * felt if pressure else felt}")
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    found = fitted(path)
+    assert found.by_pressure[1] == pytest.approx(1.5 * found.by_pressure[0], rel=0.1)
+    assert found.by_pressure[0] == pytest.approx([BREAKOUT_N, FRICTION_N], rel=0.1)
+    (doubt,) = found.doubts("column")
+    assert doubt.startswith("breakout and friction depend on q̄: ") and "at 3000 Pa" in doubt
+
+
 def test_the_readings_of_a_fit_are_limited_by_means(tmp_path: Path) -> None:
     sweep = read_sweep(column_sweep(tmp_path, readings=4000), "column")
     assert len(sweep.force) == 400 * len(FORCES)
