@@ -381,7 +381,7 @@ class _Fit:
         _, common = self._solve(nodes)
         gain = count * np.log((np.mean(common**2) + least) / (np.mean(residual**2) + least))
         more = (len(each) - 2) * np.log(count)
-        found = values[: len(each)].reshape(-1, 2)
+        found = np.asarray(values[: len(each)]).reshape(-1, 2)
         return found if gain > more + VERY_STRONG else found[:0]
 
     def feel(self) -> Feel:
@@ -413,7 +413,8 @@ class _Fit:
             *(self._pressures, np.array(self._nodes), force),
             float(np.sqrt(residual @ residual / freedom)),
             float(values[2] - values[3]) if count > 2 else 0.0,
-            *(straight, self._sweep, self._used, self._by_pressure(nodes)),
+            *(straight, self._sweep, self._used),
+            self._by_pressure(nodes),
         )
 
 
