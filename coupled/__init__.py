@@ -10,7 +10,7 @@
 
 Load
     load_rig        a rig file, or a shipped rig by name: `Rig`
-    new_rig         a first rig for a JSBSim aircraft; `rig.save` writes it
+    new_rig         a draft rig for a JSBSim aircraft; `rig.save` writes it
     models          JSBSim's aircraft: where each trims, how its controls move
     terms           the named functions of an aircraft's aerodynamics, with their shares
     load_run        a run file, or a shipped run by name: a `Manoeuvre` for each case

@@ -1,19 +1,18 @@
-"""The command `coupled`, and `python -m coupled`: the command line, begun and left quickly."""
+"""The command `coupled`, and `python -m coupled`, with fast start and exit."""
 
 from __future__ import annotations
 
 import atexit
 import os
 
-INTERRUPTED = 130  # as a shell tells of Ctrl-C
+INTERRUPTED = 130  # as in a shell after Ctrl-C
 
 
 def command() -> None:
-    """Run the command line, and leave without taking the interpreter apart.
+    """Run the command line, and exit without finalising the interpreter.
 
-    That takes a quarter of a short command's time, and seconds after an interruption; what is
-    to be done at the end is done, files and streams are closed by then. Nothing is loaded before
-    an interruption can be dealt with.
+    Finalising takes a quarter of the time of a short command, and seconds after an interruption;
+    files and streams are closed before. Nothing is imported before interruptions are handled.
     """
     try:
         from coupled.cli import main

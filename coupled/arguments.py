@@ -1,9 +1,9 @@
-"""What a public function may be given, checked against its annotations before it runs.
+"""Type checks of the arguments of public functions, by their annotations.
 
 `public` marks a function, or a class with its constructor and its public methods. A call whose
-arguments do not fit the annotations raises InputError, or TypeError where the call does not fit
-the signature; both name the function and the argument, and say what would be right. What a value
-means (a range, a file that is there) is checked by the function itself.
+arguments do not fit the annotations raises InputError, or TypeError if it does not fit the
+signature; both name the function and the argument, and the valid types. The function itself checks
+values (a range, an existing file).
 """
 
 from __future__ import annotations
@@ -66,10 +66,10 @@ def checks_itself(function: T) -> T:
 
 
 def _check_member(owner: type, name: str, member: Any) -> None:
-    """Let a function of a class check its arguments; leave what is none."""
+    """Make a function of a class check its arguments; other members are unchanged."""
     kind = type(member) if isinstance(member, (classmethod, staticmethod)) else None
     function = member.__func__ if kind else member
-    # What a library puts into a class, as pydantic does, checks its arguments itself.
+    # Functions that a library adds to a class, as pydantic does, check their arguments themselves.
     if not isinstance(function, types.FunctionType) or function.__module__ != owner.__module__:
         return
     if getattr(function, MARK, False):
@@ -102,15 +102,15 @@ def _checked(function: types.FunctionType, name: str) -> Callable[..., Any]:
 
 @cache
 def hints_of(function: types.FunctionType) -> dict[str, Any]:
-    """Return {parameter: annotation} of a function, of those that it annotates."""
+    """Return {parameter: annotation} of the annotated parameters of a function."""
     written = {n: a for n, a in function.__annotations__.items() if n != "return"}
-    # By a holder of their own, since the return may be of a type that only type checkers import.
+    # Parameters only, since the return type may be imported for type checkers only.
     holder = types.SimpleNamespace(__annotations__=written)
     return get_type_hints(holder, function.__globals__, None, include_extras=True)
 
 
 def _check(value: Any, hint: Any, name: str, parameter: inspect.Parameter) -> None:
-    """Raise InputError where an argument, or one of several, does not fit."""
+    """Raise InputError if an argument, or one of several, does not fit."""
     if parameter.kind is inspect.Parameter.VAR_POSITIONAL:
         checks = [(parameter.name, each, hint) for each in value]
     elif parameter.kind is inspect.Parameter.VAR_KEYWORD:
@@ -139,7 +139,7 @@ def _words(hint: Any) -> tuple[str, ...]:
 
 def _options(hint: Any) -> Iterator[Any]:
     """Yield the alternatives of a union, or the annotation itself."""
-    alias = getattr(get_origin(hint) or hint, "__value__", None)  # of `type`, as numpy.NDArray is
+    alias = getattr(get_origin(hint) or hint, "__value__", None)  # as of numpy.NDArray
     if alias is not None:
         yield from _options(alias)
     elif get_origin(hint) is Annotated:
@@ -152,7 +152,7 @@ def _options(hint: Any) -> Iterator[Any]:
 
 
 def fits(value: Any, hint: Any) -> bool:
-    """Tell whether a value is of an annotated type, and what it holds of theirs."""
+    """Return whether a value and its items have the annotated types."""
     return any(_fits_one(value, option) for option in _options(hint))
 
 
@@ -164,7 +164,7 @@ def _fits_one(value: Any, hint: Any) -> bool:
     if not isinstance(origin, type) or origin in (object, Any):
         return True
     if isinstance(value, str) and origin is not str:
-        return False  # a text is a sequence, too
+        return False  # a text is a sequence as well
     return isinstance(value, origin) and _holds(value, origin, inner)
 
 
@@ -178,14 +178,14 @@ _TESTS: dict[Any, Callable[[Any, tuple[Any, ...]], bool]] = {
 
 
 def _is_number(value: Any) -> bool:
-    """Tell whether a value is a number, and not an integer beyond all numbers."""
+    """Return whether a value is a number that a float can represent."""
     if isinstance(value, bool) or not isinstance(value, Real):
         return False
     return not isinstance(value, Integral) or abs(int(value)) <= sys.float_info.max
 
 
 def _holds(value: Any, origin: type, inner: tuple[Any, ...]) -> bool:
-    """Tell whether a container holds what is annotated."""
+    """Return whether the items of a container have the annotated types."""
     if not inner:
         return True
     if issubclass(origin, Mapping):
@@ -196,7 +196,7 @@ def _holds(value: Any, origin: type, inner: tuple[Any, ...]) -> bool:
 
 
 def described(hint: Any) -> str:
-    """Return in words what fits an annotation."""
+    """Return a description of the values that fit an annotation."""
     options = list(_options(hint))
     alone = [one for one in options if not _is_container(one)]
     found = list(dict.fromkeys(map(_described_one, alone)))
@@ -214,7 +214,7 @@ def _is_container(hint: Any) -> bool:
 
 
 def _described_container(hint: Any, alone: Sequence[Any]) -> str:
-    """Return a container in words; `alone` are the alternatives that are none."""
+    """Return a description of a container; `alone` are the alternatives that are no container."""
     held = list(_options(get_args(hint)[-1]))
     if held[-1] is Ellipsis:
         held = list(_options(get_args(hint)[0]))

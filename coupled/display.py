@@ -1,7 +1,7 @@
-"""Units for people: what a quantity in SI is written in, and by which factor.
+"""Units for display: the displayed unit of an SI quantity, and the conversion factor.
 
-A name ends in its unit, as `force_N` or `peak_rate_rad_per_s`. People get degrees, per cent and
-newtons, or with the system `us` pounds, inches, knots and feet. Files and JSON stay in SI.
+A name ends in its unit, as `force_N` or `peak_rate_rad_per_s`. Displayed are degrees, per cent and
+newtons, or in the system `us` pounds, inches, knots and feet. Files and JSON are in SI.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ SHARES: Final = ("loss", "loss_closed_form", "felt_ratio", "felt_ratio_closed_fo
 
 @dataclass(frozen=True)
 class Shown:
-    """What a quantity is written in: the unit's word, and by what its SI number is multiplied.
+    """The displayed unit of a quantity, and the factor from SI.
 
-    `words` name the quantity, where they are known.
+    `words` name the quantity, if known.
     """
 
     unit: str
@@ -40,21 +40,21 @@ class Shown:
 
     @property
     def label(self) -> str:
-        """The quantity's words with the unit, for an axis or a head."""
+        """The words with the unit, for an axis or a heading."""
         return self.labelled(self.words)
 
     def labelled(self, words: str) -> str:
-        """Return other words with the unit; the words alone for a number without a unit."""
+        """Return other words with the unit; without one, the words alone."""
         return f"{words}, {self.unit}" if self.unit else words
 
     def written(self, value: float, digits: int = 4) -> str:
-        """Return a number of so many figures, without its unit."""
+        """Return a number with `digits` significant digits, without its unit."""
         text = f"{self.factor * value:.{digits}g}"
         return "0" if float(text) == 0.0 else text
 
 
 def percent(share: float, decimals: int = 1) -> str:
-    """Return a share in per cent, without a sign before a zero."""
+    """Return a share in per cent, without a sign before zero."""
     text = f"{100.0 * share:.{decimals}f}"
     return f"{text.lstrip('-') if float(text) == 0.0 else text} %"
 
@@ -88,25 +88,25 @@ _ALTITUDE: Final = Shown("ft", 1.0 / FOOT_m)
 
 
 def unit_in(name: str) -> str:
-    """Return the unit that a name ends in, as `rad_per_s`; nothing where it has none."""
+    """Return the unit suffix of a name, as `rad_per_s`, or ""."""
     ends = [unit for unit in _SI if name == unit or name.endswith(f"_{unit}")]
     return max(ends, key=len, default="")
 
 
-# The same for units as they are written, factor by factor: N·s/m, N/rad.
+# The same for units as text, factor by factor: N·s/m, N/rad.
 _WRITTEN: Final[Mapping[str, Shown]] = {
     "N": Shown("lb", 1.0 / POUND_N),
     "m": Shown("in", 1.0 / INCH_m),
     "rad": Shown("°", 1.0 / DEGREE_rad),
     "Pa": Shown("(lb/ft²)", 1.0 / PSF_Pa),
-    "kg": Shown("lb", GRAVITY_m_per_s2 / POUND_N),  # of mass
+    "kg": Shown("lb", GRAVITY_m_per_s2 / POUND_N),  # mass
 }
 _FACTOR = re.compile("[A-Za-z]+")
 _POWER: Final[Mapping[str, int]] = {"²": 2, "³": 3}
 
 
 def in_system(unit: str, system: System = "si") -> Shown:
-    """Return what a unit as it is written, `N·s/m`, is shown in; as it is in SI."""
+    """Return the displayed unit for a unit as text, `N·s/m`; in SI the unit is unchanged."""
     if system == "si":
         return Shown(unit)
     factor, under, text, end = 1.0, False, "", 0
@@ -122,23 +122,23 @@ def in_system(unit: str, system: System = "si") -> Shown:
 
 
 def pressure_shown(system: System = "si") -> Shown:
-    """Return what a dynamic pressure in Pa is written in: kPa, or lb/ft²."""
+    """Return the displayed unit of a dynamic pressure in Pa: kPa, or lb/ft²."""
     return drawn("Pa", system)
 
 
 def pressure_in(pressure_Pa: float, system: System = "si", digits: int = 2) -> str:
-    """Return a dynamic pressure as text, with so many decimals in kPa."""
+    """Return a dynamic pressure as text, with `digits` decimals in kPa."""
     unit = pressure_shown(system)
     return f"{unit.factor * pressure_Pa:.{digits}f} {unit.unit}"
 
 
 def convert(value: float, unit: str, system: System = "si") -> float:
-    """Return a quantity in the unit that `in_system` shows it in."""
+    """Return a quantity converted to the unit of `in_system`."""
     return in_system(unit, system).factor * value
 
 
 def split_unit(name: str) -> tuple[str, str]:
-    """Return a name without its unit, and the unit as it is written: `play_m` is play, m."""
+    """Return a name without its unit suffix, and the unit as text: `play_m` is play, m."""
     words = name.split("_")
     first = len(words)
     if first > 1 and words[-2] == "per":
@@ -157,7 +157,7 @@ _PARTS: Final = frozenset(
 
 
 def parameter_label(key: str) -> str:
-    """Return a varied key of a rig or run with its unit: `column loader bend, m/N`."""
+    """Return the label of a varied key with its unit: `column loader bend, m/N`."""
     *tables, last = key.split(".")
     name, unit = split_unit(last)
     words = [table for table in tables if table not in _TABLES]
@@ -165,12 +165,12 @@ def parameter_label(key: str) -> str:
     return f"{label}, {'of travel' if unit == 'norm' else unit}" if unit else label
 
 
-# Tables of the files that a label leaves out.
+# File tables that a label omits.
 _TABLES: Final = frozenset(("rig", "controls", "flight", "properties", "event"))
 
 
 def shown(name: str, system: System = "si") -> Shown:
-    """Return what a quantity of this name is written in; a bare number as it is."""
+    """Return the displayed unit of a quantity from its name; names without a unit are unchanged."""
     if name in SHARES:
         return Shown("%", 100.0)
     unit = unit_in(name)
@@ -180,9 +180,9 @@ def shown(name: str, system: System = "si") -> Shown:
 
 
 def drawn(name: str, system: System = "si", fine: bool = False) -> Shown:
-    """Return what a quantity of this name is drawn in: as `shown`, but cm, kPa and g in SI.
+    """Return the unit of a quantity in figures: as `shown`, but cm, kPa and g in SI.
 
-    `fine` is for residuals and travels: mm in place of cm.
+    `fine` is for residuals and travels: mm instead of cm.
     """
     unit = unit_in(name)
     if name == "load_factor":

@@ -104,7 +104,7 @@ class LoaderEnv(gymnasium.Env[Floats, Floats]):
         if not self.observed:
             raise InputError(_ENV, "observed", "needs at least one channel")
         for channel in self.observed:
-            state[channel]  # raises InputError for an unknown one
+            state[channel]  # raises InputError for an unknown channel
         self._limit_N, self._frames = force_limit_N, frames
         self._angle, self._change_rad = ATTITUDE[self._controls[0]], change_rad
         if reward is None and self._angle not in state:
@@ -124,11 +124,11 @@ class LoaderEnv(gymnasium.Env[Floats, Floats]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Floats, dict[str, Any]]:
-        """Return to trim; the first observation, and no further information.
+        """Return to trim; return the first observation, and no further information.
 
-        Without a seed the next one is drawn from the environment's generator.
+        Without a seed it is drawn from the environment's generator.
         """
-        super().reset(seed=None if seed is None else int(seed))  # gymnasium takes no numpy.int64
+        super().reset(seed=None if seed is None else int(seed))  # not numpy.int64
         own = int(self.np_random.integers(2**31)) if seed is None else seed
         state = self._session.reset(own)
         self._started_rad = state.as_dict().get(self._angle, 0.0)
@@ -136,14 +136,14 @@ class LoaderEnv(gymnasium.Env[Floats, Floats]):
 
     @checks_itself
     def step(self, action: Floats | Sequence[float]) -> Stepped:
-        """Hold the forces over the frames of a step.
+        """Fly one step with constant forces.
 
         Return the observation, the reward, whether the flight ended early, False (`gymnasium.make`
-        truncates), and under `ended_early` why it ended.
+        truncates), and under `ended_early` the reason.
         """
         try:
             share = np.asarray(action, dtype=np.float64)
-        except (TypeError, ValueError, OverflowError):  # no numbers
+        except (TypeError, ValueError, OverflowError):  # not numbers
             share = np.zeros(0)
         if share.shape != (len(self._controls),) or not np.all(np.abs(share) <= 1.0):
             problem = f"is {action!r:.60}; give {len(self._controls)} from -1 to 1"
@@ -178,7 +178,7 @@ class LoaderEnv(gymnasium.Env[Floats, Floats]):
 
 
 def _usual(state: State, controls: Sequence[str]) -> list[str]:
-    """Return the motion, and each control's deflection and force as they are read."""
+    """Return the channels of the motion, and of each control's deflection and force as measured."""
     moving = [name for name in state if not name.startswith(("column_", "wheel_", "pedals_"))]
     hands = [
         name

@@ -1,4 +1,4 @@
-"""What a user did, or a flight met, that ends the work: one line each."""
+"""Errors of user input or of a flight, reported as one line each."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from contextlib import contextmanager, suppress
 from itertools import islice
 from typing import TextIO
 
-LONGEST = 200  # characters of a user's word that a message repeats
-LONGEST_VALUE = 60  # characters of a value that a message repeats
+LONGEST = 200  # characters of a user's text repeated in a message
+LONGEST_VALUE = 60  # characters of a value repeated in a message
 LONGEST_MESSAGE = 3000  # characters of a whole message
-MISSING = "is missing"  # the problem of a key that must be given
-LISTED = 100  # known words that a hint lists
-_SEARCHED = 2000  # known words that a hint is sought among
+MISSING = "is missing"  # problem of a required key
+LISTED = 100  # known names listed in a hint
+_SEARCHED = 2000  # known names searched for a hint
 
 
 def printable(text: str) -> str:
-    """Return text with a question mark for each character that a terminal would act on.
+    """Return text with a question mark for each character that a terminal would interpret.
 
-    Escape sequences, other control characters and bytes that are no text go; spaces,
-    tabs and the ends of lines stay.
+    These are escape sequences, other control characters and invalid bytes. Spaces, tabs and line
+    ends are kept.
     """
     if text.isprintable():
         return text
@@ -29,19 +29,19 @@ def printable(text: str) -> str:
 
 
 def shown(text: str, longest: int = LONGEST) -> str:
-    """Return a user's word as a message repeats it: on one line, printable, and cut if long."""
+    """Return a user's text for a message: on one line, printable, and cut if long."""
     plain = printable(text[: longest + 1]).replace("\n", "?").replace("\t", "?")
     return plain if len(plain) <= longest else plain[:longest] + "…"
 
 
 def shown_value(value: object) -> str:
-    """Return a value of a file or of a call as a message repeats it, cut if long."""
+    """Return a value of a file or of a call for a message, cut if long."""
     if isinstance(value, int) and abs(value) > 10**300:
         return "an integer of hundreds of digits"
     text = f"of type {type(value).__name__}"
     plain = isinstance(value, (bool, int, float, str, list, tuple, dict, set, type(None)))
-    if plain or getattr(value, "shape", None) == ():  # a number of numpy
-        with suppress(ValueError):  # of an integer of thousands of digits, which Python writes not
+    if plain or getattr(value, "shape", None) == ():  # a numpy scalar
+        with suppress(ValueError):  # Python refuses to write integers of thousands of digits
             text = repr(value)
     return text if len(text) <= LONGEST_VALUE else text[: LONGEST_VALUE - 3] + "..."
 
@@ -54,25 +54,24 @@ def say_warning(
     file: TextIO | None = None,
     line: str | None = None,
 ) -> None:
-    """Print a library's warning as one line, without the place in the code that it comes from.
+    """Print a library's warning as one line, without the code location.
 
-    To be set as `warnings.showwarning`.
+    Meant as `warnings.showwarning`.
     """
     print(f"note: {_sentence(str(message))}", file=file or sys.stderr)
 
 
 def _sentence(text: str) -> str:
-    """Return a message on one line, its long words cut, and the whole cut if it is endless."""
+    """Return a message on one line, with long words and long messages cut."""
     cut = " ".join(shown(word) for word in text[: 100 * LONGEST_MESSAGE].split())
     return shown(cut, LONGEST_MESSAGE)
 
 
 class InputError(ValueError):
-    """Input that cannot be used. Its text is the one line that a user sees.
+    """An error in the user's input. Its text is the one line that a user sees.
 
-    Parameters: `file` where the fault stands, `key` within it (dotted; may be
-    empty), and `problem`, which also says what would be right. `more` are further
-    faults of the same file, each a line of its own.
+    Parameters: the `file` with the error, the `key` in the file (dotted; may be empty), and the
+    `problem`, with a hint to correct it. `more` are further errors of the same file.
 
     >>> import coupled
     >>> try:
@@ -94,24 +93,24 @@ class InputError(ValueError):
     def __reduce__(
         self,
     ) -> tuple[type[InputError], tuple[str, str, str, tuple[InputError, ...]]]:
-        """Let it pass from one process to another."""
+        """Pickle the error, to pass it between processes."""
         return InputError, (self.file, self.key, self.problem, self.more)
 
     @property
     def every(self) -> tuple[InputError, ...]:
-        """The fault, and the further ones of its file."""
+        """The error itself and the further errors of the same file."""
         return (self, *self.more)
 
 
 class MissingKeyError(InputError, KeyError):
-    """A key, a channel or the like that is not there."""
+    """A missing key, channel or similar name."""
 
     __str__ = InputError.__str__
 
 
 @contextmanager
 def collected(faults: list[InputError]) -> Iterator[None]:
-    """Keep the faults of what is done within, so that those of the rest are found, too."""
+    """Collect an InputError of this context in `faults`, so that later errors are found too."""
     try:
         yield
     except InputError as error:
@@ -119,7 +118,7 @@ def collected(faults: list[InputError]) -> Iterator[None]:
 
 
 def together(faults: Sequence[InputError]) -> InputError:
-    """Return the faults of a file as one that is raised: the first, with the others."""
+    """Return the errors of a file as one error: the first, with the others in `more`."""
     every = [one for fault in faults for one in fault.every]
     hints = " ".join(one.problem for one in every)
     found: dict[tuple[str, str], InputError] = {}
@@ -132,17 +131,17 @@ def together(faults: Sequence[InputError]) -> InputError:
             for other in every
         )
         if one.problem == MISSING and (renamed or wrong):
-            continue  # it is there, by another name or with a fault of its own
+            continue  # present under another name, or with an error
         found.setdefault((one.key, one.problem), InputError(one.file, one.key, one.problem))
     first, *others = found.values()
     return InputError(first.file, first.key, first.problem, others)
 
 
 def nearest(word: str, known: Iterable[str]) -> str:
-    """Return a hint that names the known word most like `word`, or lists the first of them."""
+    """Return a hint with the known name most similar to `word`, or a list of known names."""
     names = [shown(name) for name in islice(known, _SEARCHED + 1)]
     begun = [name for name in names if word and name.startswith(f"{word}_")]
-    if begun:  # its unit was left out
+    if begun:  # its unit was omitted
         return f"did you mean {_quoted(min(begun, key=len))}?"
     plain = {name.casefold(): name for name in names}
     match = difflib.get_close_matches(word[:LONGEST].casefold(), plain, n=1, cutoff=0.6)
@@ -153,10 +152,10 @@ def nearest(word: str, known: Iterable[str]) -> str:
 
 
 def listed(names: Iterable[str]) -> str:
-    """Return names in a row, those with a comma in them in quotes."""
+    """Return names separated by commas; names that contain a comma are quoted."""
     return ", ".join(_quoted(shown(name)) for name in names)
 
 
 def _quoted(name: str) -> str:
-    """Return a name as a list of names shows it, so that its commas are its own."""
+    """Return a name quoted if it contains a comma."""
     return f'"{name}"' if "," in name else name

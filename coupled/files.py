@@ -1,9 +1,9 @@
-"""Files are read once they are known to be files, and written whole or not at all.
+"""Safe reading of regular files, and atomic writing.
 
-What a command is given to read may be a folder, a pipe, a device or of any size: every
-reader opens it here. What it writes is made beside its place, under a name that tells the
-process that makes it, and put there in one step; what a killed process left is cleared by
-the next one that writes into the same folder.
+A path to read may be a folder, a pipe, a device or a file of any size: every reader opens it here.
+A file is written under a temporary name in the same folder, which contains the process number, and
+renamed. Temporary files of killed processes are removed by the next process that writes into the
+folder.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ from typing import Any
 
 from coupled.errors import InputError
 
-MOST_TEXT_bytes = 64 * 2**20  # of a text that a person or this program wrote
-MOST_TABLE_bytes = 4 * 2**30  # of a table of numbers: hours of a record
+MOST_TEXT_bytes = 64 * 2**20  # a text written by a person or this program
+MOST_TABLE_bytes = 4 * 2**30  # a table of numbers: hours of a record
 _AT_ONCE = getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
 _STARTED_s = time.time()
 _HOST = re.sub(r"[^A-Za-z0-9]", "_", platform.node())[:40]
@@ -39,19 +39,19 @@ _UNFINISHED = re.compile(r"\.coupled-([A-Za-z0-9_]*)-(\d{1,9})-[0-9a-f]{12}(\.[^
 
 
 def named(path: Path) -> Path:
-    """Return a path that has a name to put another one beside. Raises InputError for `.` or `/`."""
+    """Return a path with a file name. Raises InputError for `.` or `/`."""
     if not path.name:
         raise InputError(path, "", "names no file and no new folder; give one by its name")
     return path
 
 
 def open_file(path: Path, most_bytes: int = MOST_TABLE_bytes) -> BufferedReader:
-    """Return an open plain file of at most so many bytes.
+    """Return an open regular file of at most `most_bytes`.
 
-    Raises InputError for a folder, a pipe, a socket or a device, without waiting for any.
+    Raises InputError for a folder, a pipe, a socket or a device, without waiting.
     """
     try:
-        # A pipe that nobody writes to would hold back an open that waits.
+        # Opening a pipe without a writer would wait.
         handle = os.open(path, os.O_RDONLY | _AT_ONCE)
     except (OSError, ValueError) as error:
         raise _unreadable(path, error) from None
@@ -67,7 +67,7 @@ def open_file(path: Path, most_bytes: int = MOST_TABLE_bytes) -> BufferedReader:
 
 
 def read_bytes(path: Path, most_bytes: int = MOST_TABLE_bytes) -> bytes:
-    """Return what a file holds. Raises InputError where it cannot be read or is too large."""
+    """Return the content of a file. Raises InputError if it cannot be read or is too large."""
     with open_file(path, most_bytes) as file:
         try:
             content = file.read(most_bytes + 1)
@@ -79,7 +79,7 @@ def read_bytes(path: Path, most_bytes: int = MOST_TABLE_bytes) -> bytes:
 
 
 def read_text(path: Path, wanted: str, most_bytes: int = MOST_TEXT_bytes) -> str:
-    """Return a text file in UTF-8, with a mark at its start or without; `wanted` is said if not."""
+    """Return a UTF-8 text, with or without byte order mark; `wanted` is for the error message."""
     try:
         text = read_bytes(path, most_bytes).decode("utf-8-sig")
     except UnicodeDecodeError:
@@ -88,7 +88,7 @@ def read_text(path: Path, wanted: str, most_bytes: int = MOST_TEXT_bytes) -> str
 
 
 def read_json(path: Path, wanted: str) -> Any:
-    """Return what a JSON file holds; `wanted` is said where it is none."""
+    """Return the content of a JSON file; `wanted` is for the error message."""
     text = read_text(path, wanted)
     try:
         return json.loads(text)
@@ -98,24 +98,24 @@ def read_json(path: Path, wanted: str) -> Any:
 
 @lru_cache(maxsize=16)
 def toml_tables(text: str) -> dict[str, Any]:
-    """Return a TOML text's tables, not to be changed: a sweep asks for its rig's at every flight.
+    """Return the tables of a TOML text, cached: do not change them.
 
-    Raises ValueError or RecursionError where it is none.
+    Raises ValueError or RecursionError if it is not TOML.
     """
     return tomllib.loads(text)
 
 
 def sha256(path: Path) -> str:
-    """Return a file's hash."""
+    """Return the SHA-256 hash of a file."""
     with open_file(path) as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def check_format(found: object, known: int, file: object, what: str) -> int:
-    """Return the version of a file's format; 0 for a file from before formats had one.
+    """Return the version of a file's format; 0 for a file without a format.
 
-    `found` is the file's own `format`, None where it has none; `known` the newest that this
-    release reads; `what` the kind of file. Raises InputError for a newer one.
+    `found` is the file's own `format` or None; `known` the newest that this release reads; `what`
+    the kind of file. Raises InputError for a newer one.
     """
     if found is None:
         return 0
@@ -144,11 +144,11 @@ _READ = "is a file that this command reads; give another to write"
 def check_target(
     path: Path, inputs: Iterable[Path] = (), why: str = _READ, made: Path | None = None
 ) -> None:
-    """Refuse a file that could not be written, before the work that it is to hold.
+    """Refuse a file that cannot be written, before its content is computed.
 
-    Nothing is made or changed. `inputs` are files that must not be overwritten, under
-    whatever name or link they are given; `why` is what is said of one of them. The file's
-    folder must be there, unless it is `made`, one that the command makes, or `out`.
+    Nothing is created or changed. `inputs` are files that must not be overwritten, under any name
+    or link; `why` is the message for them. The file's folder must exist, unless it is `made`, a
+    folder that the command creates, or `out`.
     """
     check_targets([path], inputs, why, made)
 
@@ -159,7 +159,7 @@ def check_targets(
     why: str = _READ,
     made: Path | None = None,
 ) -> None:
-    """Refuse files of which one could not be written, is an input, or is meant twice."""
+    """Refuse files of which one cannot be written, is an input, or occurs twice."""
     if made is not None and made.resolve() == made.resolve().parent:
         raise InputError(made, "", "is the root of the file system; give a folder of its own")
     read = {identity for path in inputs for identity in _identities(path)}
@@ -192,11 +192,11 @@ def _check_place(path: Path) -> None:
         raise InputError(path, "", "cannot be written there")
 
 
-OWN_FOLDER = "out"  # where files go that are given no other place; made where it is not there
+OWN_FOLDER = "out"  # default folder of output files, created if needed
 
 
 def _refuse_mistyped(path: Path, made: Path | None) -> None:
-    """Refuse a file in a folder that is not there: a mistyped one would be made in silence."""
+    """Refuse a file in a folder that does not exist, since its name may be mistyped."""
     own, folder = Path(OWN_FOLDER).absolute(), path.absolute().parent
     if made is not None and made.absolute() in (folder, *folder.parents):
         folder = made.absolute().parent
@@ -211,7 +211,7 @@ def _refuse_mistyped(path: Path, made: Path | None) -> None:
 
 
 def _identities(path: Path) -> set[object]:
-    """Return what tells a file under all its names: its path without links, and its inode."""
+    """Return the identities of a file under all its names: its resolved path and its inode."""
     found: set[object] = {os.path.realpath(path)}
     try:
         there = path.stat()
@@ -221,7 +221,7 @@ def _identities(path: Path) -> set[object]:
 
 
 def write_whole(path: Path, write: Callable[[Path], object]) -> None:
-    """Let `write` make a file beside `path`, then put it in its place in one step."""
+    """Write a file atomically: `write` receives a temporary path in the same folder."""
     part = path.parent / unfinished_name(path.suffix)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -236,12 +236,12 @@ def write_whole(path: Path, write: Callable[[Path], object]) -> None:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a text file in UTF-8, whole; a file name that is no text appears with `?` in it."""
+    """Write a UTF-8 text atomically; file names that are not valid text are written with `?`."""
     write_whole(path, lambda part: part.write_bytes(text.encode("utf-8", "replace")))
 
 
 def json_text(table: Any, indent: int = 2, sort_keys: bool = False) -> str:
-    """Return a table as JSON, its letters as they are; escaped where a file name is no text."""
+    """Return a table as JSON with non-ASCII letters; escaped if a file name is not valid text."""
     plain = finite(table)
     text = json.dumps(
         plain, indent=indent, sort_keys=sort_keys, ensure_ascii=False, allow_nan=False
@@ -256,7 +256,7 @@ def json_text(table: Any, indent: int = 2, sort_keys: bool = False) -> str:
 def finite(table: Any) -> Any:
     """Return nested tables and lists with None for each number that is not finite.
 
-    JSON has neither infinity nor NaN, and a reader that keeps to its standard refuses the file.
+    JSON has neither infinity nor NaN, and strict readers refuse such a file.
     """
     if isinstance(table, dict):
         return {key: finite(value) for key, value in table.items()}
@@ -266,27 +266,24 @@ def finite(table: Any) -> Any:
 
 
 def unwritable(path: Path, error: OSError) -> InputError:
-    """Return the fault of a file that the system does not let be written."""
+    """Return the error of a file that the system cannot write."""
     return InputError(path, "", f"cannot be written: {error.strerror or error}")
 
 
 def unfinished_name(suffix: str) -> str:
-    """Return a new name for what this process has not finished: it tells computer and process."""
+    """Return a new name for a temporary file, with the names of computer and process."""
     return f".coupled-{_HOST}-{os.getpid()}-{secrets.token_hex(6)}{suffix}"
 
 
 def clear(folder: Path) -> None:
-    """Remove what killed processes of this computer left unfinished in a folder.
-
-    A process looks once at a folder.
-    """
+    """Remove temporary files of killed processes on this computer from a folder, once."""
     _clear(folder.absolute())
 
 
 def temporary_folder() -> Path:
-    """Make a folder in the system's temporary one, and return it; whoever asks removes it.
+    """Create a temporary folder and return it; the caller removes it.
 
-    It bears the name of this process, so that another clears it if this one is killed.
+    Its name contains the process number, so that another process removes it if this one is killed.
     """
     made = Path(tempfile.gettempdir()) / unfinished_name("")
     made.mkdir(mode=0o700)
@@ -294,10 +291,7 @@ def temporary_folder() -> Path:
 
 
 def clear_temporary(again: bool = False) -> None:
-    """Remove what killed processes of this computer left in the system's temporary folder.
-
-    A process looks once, unless `again` is asked for.
-    """
+    """Remove temporary folders of killed processes, once per process unless `again`."""
     with contextlib.suppress(OSError):
         (_clear.__wrapped__ if again else _clear)(Path(tempfile.gettempdir()))
 
@@ -316,16 +310,16 @@ def _clear(folder: Path) -> None:
             else:
                 path.unlink()
         except OSError:
-            continue  # another process clears it, or may not be asked
+            continue  # another process removes it, or this one may not
 
 
 def _is_stale(path: Path) -> bool:
-    """Tell whether no living process of this computer makes an unfinished file."""
+    """Return whether no living process of this computer writes a temporary file."""
     match = _UNFINISHED.fullmatch(path.name)
     if match is None or match[1] != _HOST or os.name != "posix":
         return False
     process = int(match[2])
-    if process == os.getpid():  # in a container every run may have the same number
+    if process == os.getpid():  # in containers every run may have the same number
         return path.stat().st_mtime < _STARTED_s - 1.0
     try:
         os.kill(process, 0)
@@ -337,8 +331,8 @@ def _is_stale(path: Path) -> bool:
 
 
 def path_from(folder: Path, path: Path) -> str:
-    """Return a path relative to a folder, with slashes; the whole path from another drive."""
+    """Return a path relative to a folder, with slashes; an absolute path on another drive."""
     try:
         return Path(os.path.relpath(path, folder.resolve())).as_posix()
-    except ValueError:  # of Windows
+    except ValueError:  # on Windows
         return path.resolve().as_posix()

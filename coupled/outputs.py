@@ -1,4 +1,4 @@
-"""Several files that belong together, written all or none."""
+"""Several files that are written together or not at all."""
 
 from __future__ import annotations
 
@@ -12,29 +12,28 @@ from types import TracebackType
 from coupled.errors import InputError
 from coupled.files import clear, unfinished_name, unwritable
 
-# What a write meets on a disk that takes no more, without the name of the file.
+# Errors of writing to a full disk, without the name of the file.
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS)
 
 
 class Outputs:
     """Several files that are put in place together: all of them, or none.
 
-    Within `with Outputs() as outputs:` each file is written to `outputs.at(path)`, which lies
-    in a folder of this process beside the file's place, under the file's own name. All are
-    moved when the block ends; if it ends by an exception, or if a move fails, everything is
-    as it was before, new folders included.
+    Within `with Outputs() as outputs:` each file is written to `outputs.at(path)`, in a temporary
+    folder beside its place, with its own file name. All files are moved at the end of the block.
+    After an exception, or if a move fails, everything is restored, including new folders.
     """
 
     def __init__(self) -> None:
-        self._staged: dict[Path, Path] = {}  # folder: where its files are made
-        self._made: list[Path] = []  # folders that were not there
+        self._staged: dict[Path, Path] = {}  # {folder: temporary folder}
+        self._made: list[Path] = []  # new folders
 
     def at(self, path: Path) -> Path:
-        """Return where a file is to be written that belongs at `path`."""
+        """Return the temporary path for a file that belongs at `path`."""
         return self.folder(path.parent) / path.name
 
     def folder(self, folder: Path) -> Path:
-        """Return where files are to be written that belong in `folder`."""
+        """Return the temporary folder for files that belong in `folder`."""
         if folder not in self._staged:
             staged = folder / unfinished_name("")
             try:
@@ -99,7 +98,7 @@ class Outputs:
                 yield part, folder / part.name
 
     def _renamed(self, error: InputError) -> InputError:
-        """Return a fault of a file that was being made, under the name that its user knows."""
+        """Return the error of a temporary file with the file name that the user knows."""
         file, problem = error.file, error.problem
         for staged in self._staged.values():
             file, problem = (text.replace(staged.name + os.sep, "") for text in (file, problem))
@@ -120,11 +119,11 @@ def _restore(path: Path, before: Path | None) -> None:
         elif before.exists():
             before.replace(path)
     except OSError:
-        return  # the disk is gone: there is nothing to put back
+        return  # the disk is gone
 
 
 def _remove_empty(folder: Path) -> None:
     try:
         folder.rmdir()
     except OSError:
-        return  # another process has written there meanwhile
+        return  # another process has written there in the meantime

@@ -1,7 +1,7 @@
-"""Where much work is done: here, on all cores, or on a dask cluster.
+"""Parallel execution: in this process, on all cores, or on a dask cluster.
 
-The three have one face, that of `concurrent.futures`. However the parent ends, its workers end
-with it. Within one piece of work, threads share what runs compiled.
+All three have the interface of `concurrent.futures`. Workers end whenever their parent ends. Within
+one task, threads run compiled code in parallel.
 """
 
 from __future__ import annotations
@@ -28,58 +28,58 @@ from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import Any, TypeVar
 
+from coupled.callpool import CallPool, call_pool
 from coupled.errors import InputError, say_warning
-from coupled.turns import Turns, turns
 
-MOST_WORKERS = 512  # processes: more than any machine has cores for
-_MOST_BESIDE = 3  # processes beside the threads of one piece of work, of 150 MB each
-_MOST_ON_WINDOWS = 61  # it waits for no more processes at once
+MOST_WORKERS = 512  # more than any machine has cores
+_MOST_WORKERS_PER_TASK = 3  # worker processes of one task, of 150 MB each
+_MOST_ON_WINDOWS = 61  # Windows waits for no more processes at once
 PATIENCE_s = 10.0
-_ATTENTIVE_s = 0.2  # a wait without end may not see an interruption before a job is done
+_POLL_s = 0.2  # polling interval: an unlimited wait cannot be interrupted
 T = TypeVar("T")
 S = TypeVar("S")
 
 
-class HaltedError(Exception):
-    """Work in a thread is not wanted any more."""
+class WorkCancelledError(Exception):
+    """The work of this thread was cancelled."""
 
 
 @dataclass(frozen=True)
-class _Team:
-    """So many threads that may work at once, and whether they are to stop.
+class _ThreadTeam:
+    """A limit on the number of threads, and a flag that stops them.
 
-    `places` are the threads that may still begin: one that waits for others gives its own up.
+    `places` counts the threads that may still start; a waiting thread releases its place.
     """
 
     threads: int = 1
     places: threading.Semaphore = field(default_factory=lambda: threading.Semaphore(0))
     halt: threading.Event = field(default_factory=threading.Event)
-    turns: Turns = field(default_factory=Turns)
-    above: _Team | None = None  # that within whose work this one works
+    calls: CallPool = field(default_factory=CallPool)
+    above: _ThreadTeam | None = None  # the team whose work contains this work
 
     @property
     def halted(self) -> bool:
-        """Whether its work, or that of which it is a part, is not wanted any more."""
+        """Whether this work, or the work that contains it, has been cancelled."""
         return self.halt.is_set() or (self.above is not None and self.above.halted)
 
 
-_ALONE = _Team()
-_team: ContextVar[_Team] = ContextVar("_team", default=_ALONE)
+_SINGLE_THREAD = _ThreadTeam()
+_team: ContextVar[_ThreadTeam] = ContextVar("_team", default=_SINGLE_THREAD)
 
 
 @contextmanager
 def threads(count: int) -> Iterator[None]:
-    """Let `in_threads` use so many threads within; 0 is one a core.
+    """Let `in_threads` use up to `count` threads in this context; 0 means one per core.
 
-    Linear algebra has one within: its matrices are small here, and threads of its own would take
-    turns with these. So an answer does not depend on how many cores it was given either.
+    BLAS uses one thread: the matrices are small, and BLAS threads would compete with these. Results
+    therefore do not depend on the number of cores.
     """
     limits = importlib.import_module("threadpoolctl").threadpool_limits  # takes 20 ms to load
     most = cores(count)
-    alone = multiprocessing.parent_process() is not None  # a worker beside others
-    beside = 0 if alone else min(most - 1, _MOST_BESIDE)
-    with limits(1, "blas"), turns(beside) as places:
-        before = _team.set(_Team(most, threading.Semaphore(most - 1), turns=places))
+    alone = multiprocessing.parent_process() is not None  # a worker among others
+    beside = 0 if alone else min(most - 1, _MOST_WORKERS_PER_TASK)
+    with limits(1, "blas"), call_pool(beside) as places:
+        before = _team.set(_ThreadTeam(most, threading.Semaphore(most - 1), calls=places))
         try:
             yield
         finally:
@@ -87,83 +87,83 @@ def threads(count: int) -> Iterator[None]:
 
 
 def in_threads(work: Callable[[S], T], items: Sequence[S]) -> list[T]:
-    """Return what `work` gives of each item, in their order, by the threads that there are.
+    """Return `[work(item) for item in items]`, computed by the available threads.
 
-    What one raises is raised here, and halts the others (`go_on`), as an interruption does. Work
-    within work takes the threads that the outer one leaves idle. Compiled stages and large arrays
-    run beside each other.
+    An exception of one item is raised here and cancels the others (`go_on`), as an interruption
+    does. Nested calls use the threads that the outer call leaves idle. Compiled code and operations
+    on large arrays run in parallel.
     """
     outer = _team.get()
     if outer.threads < 2 or len(items) < 2:
         return [work(item) for item in items]
-    team = _Team(outer.threads, outer.places, turns=outer.turns, above=outer)
+    team = _ThreadTeam(outer.threads, outer.places, calls=outer.calls, above=outer)
     todo, done = SimpleQueue[int](), dict[int, T]()
     faults: list[BaseException] = []
     for number in range(len(items)):
         todo.put(number)
 
-    def some() -> None:
+    def run_items() -> None:
         before = _team.set(team)
         try:
             while True:
                 go_on()
                 number = todo.get_nowait()
                 done[number] = work(items[number])
-        except (Empty, HaltedError):
+        except (Empty, WorkCancelledError):
             pass
-        except BaseException as error:  # raised where the work was asked for
+        except BaseException as error:  # raised in the calling thread
             faults.append(error)
             team.halt.set()
         finally:
             _team.reset(before)
 
-    def help_out() -> None:
+    def run_and_release() -> None:
         try:
-            some()
+            run_items()
         finally:
             team.places.release()
 
     helpers: list[threading.Thread] = []
     try:
         while len(helpers) < len(items) - 1 and team.places.acquire(blocking=False):
-            helpers.append(threading.Thread(target=help_out, daemon=True))
+            helpers.append(threading.Thread(target=run_and_release, daemon=True))
             helpers[-1].start()
-        some()
+        run_items()
         if helpers:
             _wait_for_all(helpers, team.places)
     finally:  # interrupted
         team.halt.set()
     for fault in faults:
         raise fault
-    go_on()  # what is not done was halted from without
+    go_on()  # cancelled by the outer work
     return [done[number] for number in range(len(items))]
 
 
 def _wait_for_all(helpers: Sequence[threading.Thread], places: threading.Semaphore) -> None:
-    """Wait for threads to end; meanwhile another may work in this one's place."""
+    """Wait for threads to end; release the place of this thread meanwhile."""
     places.release()
     for helper in helpers:
         while helper.is_alive():
-            helper.join(_ATTENTIVE_s)
+            helper.join(_POLL_s)
     places.acquire()
 
 
 def in_turn(work: partial[T]) -> T:
-    """Return what `work` gives, which holds the interpreter (`Turns`)."""
-    return _team.get().turns.call(work)
+    """Return `work()` for work that holds the GIL (`CallPool`)."""
+    return _team.get().calls.call(work)
 
 
 def go_on() -> None:
-    """Raise HaltedError where this thread's work is not wanted any more."""
+    """Raise WorkCancelledError if the work of this thread has been cancelled."""
     if _team.get().halted:
-        raise HaltedError
+        raise WorkCancelledError
 
 
-class Here(Executor):
-    """An executor that does the work at once, in this process."""
+class SerialExecutor(Executor):
+    """An executor that runs work immediately, in this process."""
 
     def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
-        """Return a future that is done; what the work raises is raised here."""
+        """Return a finished future; exceptions of the work are raised here."""
         future: Future[Any] = Future()
         future.set_result(fn(*args, **kwargs))
         return future
@@ -172,13 +172,13 @@ class Here(Executor):
 def as_done(
     pool: Executor, work: Callable[..., T], calls: Iterable[Sequence[Any]], ahead: int
 ) -> Iterator[T]:
-    """Yield what `work` gives of each call's arguments, as soon as it is done, in any order.
+    """Yield the result of `work(*arguments)` for each call as soon as it is done, in any order.
 
-    No more than `ahead` calls wait for a worker, so that their arguments are made as they are
-    wanted. What a call raises is raised here. An interruption is met within a fraction of a
-    second, however long a call takes.
+    At most `ahead` calls wait for a worker, so arguments are generated when they are needed. An
+    exception of a call is raised here. An interruption is handled within a fraction of a second,
+    however long a call takes.
     """
-    if isinstance(pool, Here):
+    if isinstance(pool, SerialExecutor):
         for arguments in calls:
             yield work(*arguments)
         return
@@ -192,63 +192,63 @@ def as_done(
             except Empty:
                 return
             waiting, patience_s = waiting - 1, 0.0
-            yield future.result()  # whatever the work raises, be it Empty too
+            yield future.result()  # may raise any exception of the work, also Empty
 
     try:
-        threading.Thread(target=_hand_over, args=(pool, work, todo, done), daemon=True).start()
+        threading.Thread(target=_submit_calls, args=(pool, work, todo, done), daemon=True).start()
         for arguments in calls:
             todo.put(arguments)
             waiting += 1
             yield from finished(0.0)
             while waiting >= ahead:
-                yield from finished(_ATTENTIVE_s)
+                yield from finished(_POLL_s)
         while waiting:
-            yield from finished(_ATTENTIVE_s)
+            yield from finished(_POLL_s)
     finally:
         todo.put(None)
 
 
-def _hand_over(
+def _submit_calls(
     pool: Executor,
     work: Callable[..., T],
     todo: SimpleQueue[Sequence[Any] | None],
     done: SimpleQueue[Future[T]],
 ) -> None:
-    """Give an executor its work, in a thread of its own.
+    """Submit calls to an executor from a thread.
 
-    Interruptions reach the main thread only. One that came there while a lock of the executor's
-    is held would leave it locked, and the threads that end the executor would wait for it for
-    ever. A worker that is begun here never gets one either.
+    Only the main thread receives interruptions. An interruption while it holds a lock of the
+    executor would leave the lock held, and the threads that end the executor would wait forever.
+    Workers that start here ignore interruptions too.
     """
     block_interruptions()
     while (arguments := todo.get()) is not None:
         try:
             future = pool.submit(work, *arguments)
-        except Exception as error:  # the workers died, or the cluster went
+        except Exception as error:  # the workers ended, or the cluster was lost
             future = Future()
             future.set_exception(error)
         future.add_done_callback(done.put)
 
 
 def block_interruptions() -> None:
-    """Keep interruptions from this thread, and from the processes that it starts as they load."""
+    """Block SIGINT in this thread, and in the processes that it starts while they load."""
     if hasattr(signal, "pthread_sigmask"):
-        resource_tracker.ensure_running()  # it would unblock them when it starts
+        resource_tracker.ensure_running()  # it would unblock the signal when it starts
         signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
 
 
 def limit_memory() -> None:
-    """Let this process ask for half of the machine's memory: a small file can declare any size."""
+    """Limit this process to half of the machine's memory: a small file can declare any size."""
     with suppress(ImportError, ValueError, OSError):
-        resource: Any = importlib.import_module("resource")  # not on every system
+        resource: Any = importlib.import_module("resource")  # not on all systems
         half = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // 2
         resource.setrlimit(resource.RLIMIT_DATA, (half, half))
 
 
 def cores(workers: int) -> int:
-    """Return how many processes a number of workers means: 0 is one a core.
+    """Return the number of processes for a `workers` option: 0 means one per core.
 
-    Raises InputError for a number that no machine has.
+    Raises InputError for a negative number or more than `MOST_WORKERS`.
     """
     if not 0 <= workers <= MOST_WORKERS:
         raise InputError(
@@ -258,15 +258,15 @@ def cores(workers: int) -> int:
     return min(wanted, _MOST_ON_WINDOWS) if sys.platform == "win32" else wanted
 
 
-def guarded() -> bool:
-    """Tell whether new processes could load the main module without running this call again.
+def main_is_guarded() -> bool:
+    """Return whether new processes can import the main module without repeating this call.
 
-    A process that is spawned loads the main script anew. A call from the script's own level is
-    reached then as well, unless it stands under `if __name__ == "__main__":`.
+    A spawned process imports the main script. It repeats a call at the top level of the script,
+    unless the call is under `if __name__ == "__main__":`.
     """
     main = sys.modules.get("__main__")
     file = getattr(main, "__file__", None)
-    if main is None or file is None:  # a notebook, or an interactive session
+    if main is None or file is None:  # a notebook or an interactive session
         return True
     frame, line = inspect.currentframe(), 0
     while frame is not None:
@@ -275,7 +275,7 @@ def guarded() -> bool:
         frame = frame.f_back
     try:
         tree = ast.parse(Path(file).read_bytes()) if line else None
-    except (OSError, ValueError, SyntaxError):  # from standard input; or of an archive, a module
+    except (OSError, ValueError, SyntaxError):  # from standard input, or a module in an archive
         return getattr(main, "__spec__", None) is not None
     if tree is None:
         return True
@@ -289,26 +289,26 @@ def guarded() -> bool:
 
 @contextmanager
 def executor(workers: int, cluster: str = "") -> Iterator[Executor]:
-    """Give an executor of so many processes, or a cluster's where an address is given.
+    """Give an executor with `workers` processes, or the executor of a cluster if it has an address.
 
-    Work that has not begun is dropped when it is left; on an error or an interruption the
-    workers end at once, within the work that they do.
+    At the end, work that has not started is cancelled. After an exception or an interruption the
+    workers are killed.
     """
     if cluster:
         with _cluster(cluster) as pool:
             yield pool
         return
-    if workers > 1 and not guarded():
+    if workers > 1 and not main_is_guarded():
         script = 'this script calls it outside of `if __name__ == "__main__":`'
         print(f"note: works in one process, not in {workers}: {script}", file=sys.stderr)
         workers = 1
     if workers <= 1:
-        yield Here()
+        yield SerialExecutor()
         return
-    # A flight's matrices are small: threads of theirs would only take turns with the other workers.
+    # The matrices of a flight are small: BLAS threads would compete with the other workers.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     own = multiprocessing.get_context("spawn")
-    # The workers hold the reading end: it closes with the parent, however that ends.
+    # Workers hold the reading end: it closes when the parent ends, also if it is killed.
     alive, ours = own.Pipe(duplex=False)
     pool = ProcessPoolExecutor(
         workers, mp_context=own, initializer=_begin_worker, initargs=(alive,)
@@ -319,8 +319,8 @@ def executor(workers: int, cluster: str = "") -> Iterator[Executor]:
         problem = "a worker died; what is finished is kept, and the same command goes on"
         raise InputError("--workers", "", problem) from None
     except BaseException:
-        ours.close()  # interrupted, or nothing to be done with the rest: no worker is waited for
-        for worker in own.active_children():  # nor one that is still loading
+        ours.close()  # interrupted, or the rest is not needed: do not wait for workers
+        for worker in own.active_children():  # also those that are still loading
             worker.kill()
         raise
     finally:
@@ -330,13 +330,13 @@ def executor(workers: int, cluster: str = "") -> Iterator[Executor]:
 
 
 def _begin_worker(alive: Connection) -> None:
-    """Leave interrupts to the parent, and end with it, even if it is killed."""
+    """Ignore SIGINT in a worker, and end it with its parent, even if the parent is killed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     warnings.showwarning = say_warning
 
     def follow() -> None:
-        wait([alive])  # it is never written to, so that this is its end
+        wait([alive])  # nothing is written to it, so this returns when it closes
         os._exit(1)
 
     threading.Thread(target=follow, daemon=True).start()
@@ -352,7 +352,7 @@ def _cluster(address: str) -> Iterator[Executor]:
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     try:
         client = distributed.Client(address, timeout=PATIENCE_s, set_as_default=False)
-    except (OSError, ValueError, TypeError, AssertionError):  # the last of a malformed address
+    except (OSError, ValueError, TypeError, AssertionError):  # AssertionError: a malformed address
         raise InputError("--cluster", "", f"{address} does not answer") from None
     try:
         client.wait_for_workers(1, timeout=PATIENCE_s)

@@ -23,14 +23,14 @@ if TYPE_CHECKING:
     from coupled.campaign.check import Asked
     from coupled.campaign.verdict import Verdict
 
-_JUDGED = "coupled_verdict"  # what a test's report carries, from workers of xdist too
-_DEFAULT = "runs/*.toml"  # where nothing is said; then a file has to look like a run, too
+_JUDGED = "coupled_verdict"  # attribute of a test's report, also from workers of xdist
+_DEFAULT = "runs/*.toml"  # default; then a file must also look like a run
 _EXPECTS = re.compile(rb"^[ \t]*\[\[[ \t]*expect[ \t]*\]\]", re.M)
 _RIG = re.compile(rb"^[ \t]*rig[ \t]*=", re.M)
 
 
 class ExpectationError(AssertionError):
-    """An expectation that does not hold."""
+    """An expectation that is not met."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -72,7 +72,7 @@ def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> RunFile | 
 
 
 def _looks_like_a_run(file: Path) -> bool:
-    """Tell whether a TOML file is a run with expectations, and not another program's."""
+    """Return whether a TOML file is a run with expectations, and not another program's."""
     try:
         text = file.read_bytes()
     except OSError:
@@ -81,13 +81,13 @@ def _looks_like_a_run(file: Path) -> bool:
 
 
 class RunFile(pytest.File):
-    """A run file. It is flown once, when the first of its tests runs."""
+    """A run file, flown once, when the first of its tests runs."""
 
     _judged: list[Verdict] | None = None
 
     def collect(self) -> Iterator[Expectation]:
-        """Yield a test for each expectation on each flight; none for a run that expects nothing."""
-        from coupled.campaign.check import asked_of
+        """Yield a test for each expectation on each flight."""
+        from coupled.campaign.check import expectations_of
         from coupled.errors import InputError
         from coupled.flight.runfile import read_run
 
@@ -95,7 +95,7 @@ class RunFile(pytest.File):
             self.cases = read_run(str(self.path))
         except InputError as error:
             raise self.CollectError("\n".join(map(str, error.every))) from None
-        for number, asked in enumerate(asked_of(self.cases)):
+        for number, asked in enumerate(expectations_of(self.cases)):
             yield Expectation.from_parent(self, name=_name(asked), number=number)
 
     def verdict(self, number: int) -> Verdict:
@@ -121,15 +121,15 @@ class Expectation(pytest.Item):
 
     def runtest(self) -> None:
         """Fly the run, if none of its tests has, and judge the expectation."""
-        from coupled.campaign.verdict import in_full
+        from coupled.campaign.verdict import verdict_text
 
         assert isinstance(self.parent, RunFile)
         self.found = self.parent.verdict(self.number)
         if not self.found.passed:
-            raise ExpectationError(in_full(self.found))
+            raise ExpectationError(verdict_text(self.found))
 
     def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
-        """Return what failed: measured, expected, margin, time and why."""
+        """Return the failure: measured, expected, margin, time and why."""
         from coupled.errors import InputError
 
         if isinstance(excinfo.value, (ExpectationError, InputError)):
@@ -137,7 +137,7 @@ class Expectation(pytest.Item):
         return super().repr_failure(excinfo, style)
 
     def reportinfo(self) -> tuple[Path, None, str]:
-        """Return where the expectation stands."""
+        """Return the location of the expectation."""
         return self.path, None, f"{self.path.name}: {self.name}"
 
 
@@ -145,25 +145,25 @@ class Expectation(pytest.Item):
 def pytest_runtest_makereport(
     item: pytest.Item, call: pytest.CallInfo[None]
 ) -> Generator[None, Any, None]:
-    """Let a test's report carry its verdict."""
+    """Add the verdict to the report of a test."""
     outcome = yield
     if isinstance(item, Expectation) and call.when == "call" and item.found is not None:
         setattr(outcome.get_result(), _JUDGED, dict(vars(item.found)))
 
 
 class FailureReport:
-    """Gathers the verdicts of all tests, whichever process ran them, and writes what failed."""
+    """Collects the verdicts of all tests from all processes, and reports the failures."""
 
     def __init__(self, file: Path) -> None:
         self.file, self.judged = file, list[dict[str, Any]]()
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        """Keep a test's verdict."""
+        """Store the verdict of a test."""
         if (judged := getattr(report, _JUDGED, None)) is not None:
             self.judged.append(judged)
 
     def pytest_terminal_summary(self, terminalreporter: Any) -> None:
-        """Write the report, and say where it is."""
+        """Write the report, and print its path."""
         from coupled.campaign.check import CheckResult
         from coupled.campaign.verdict import Verdict
 

@@ -1,4 +1,4 @@
-"""Where the shipped aircraft and runs lie: in the repo, or inside the installed package."""
+"""The folders of the shipped aircraft and runs: in the repository, or in the installed package."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def _shipped(kind: str) -> Path:
 
 @lru_cache(maxsize=8)
 def _files(folder: Path, pattern: str) -> dict[str, Path]:
-    """Return shipped files by name; they stay, and each flight of a sweep asks for its rig."""
+    """Return shipped files by name, cached."""
     return {path.stem: path for path in sorted(folder.glob(pattern))}
 
 
@@ -48,14 +48,14 @@ def shipped_sweeps() -> dict[str, Path]:
 
 
 def starter(name: str) -> Path:
-    """Return a commented file to start from, by its name."""
+    """Return the path of a commented template."""
     return Path(__file__).parent / "starters" / name
 
 
 def find(name: str, shipped: dict[str, Path], kind: str, beside: Path | None = None) -> Path:
-    """Return the file that a user's word means: a path, or the name of a shipped one.
+    """Return the file of a user's word: a path, or the name of a shipped one.
 
-    A relative path is sought beside the file that names it, then where the user stands.
+    A relative path is searched beside the file that names it, then in the working folder.
     """
     if "/" not in name and not name.endswith(".toml"):
         if name in shipped:
@@ -67,13 +67,13 @@ def find(name: str, shipped: dict[str, Path], kind: str, beside: Path | None = N
         try:
             if (folder / name).is_file():
                 return folder / name
-        except (OSError, ValueError):  # a name that no file can have
+        except (OSError, ValueError):  # an impossible file name
             break
     raise InputError(name, "", f"there is no such {kind} file")
 
 
 def find_named(file: Path, key: str, name: str, shipped: dict[str, Path], kind: str) -> Path:
-    """Return the file that a key of another file names; a wrong name is that file's fault."""
+    """Return the file named by a key of another file; an error names that file and key."""
     try:
         return find(name, shipped, kind, beside=file.parent)
     except InputError as error:

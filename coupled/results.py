@@ -1,7 +1,7 @@
-"""What every result has: a display in notebooks, a figure, a report, and tables.
+"""Base classes of results: display in notebooks, figure, report, and tables.
 
-How a result becomes HTML or a figure is known in one place, `coupled.api.display`, which needs all
-results. It is loaded when a result is first displayed.
+`coupled.api.display` converts results to HTML and figures. It imports all result classes, so it is
+loaded when a result is first displayed.
 """
 
 from __future__ import annotations
@@ -21,34 +21,34 @@ if TYPE_CHECKING:
 
 
 class Display(Protocol):
-    """What knows how a result is displayed."""
+    """The functions that display results."""
 
     def draw(self, result: Any) -> Figure:
-        """Return a result's figure."""
+        """Return the figure of a result."""
 
     def html(self, result: Any) -> str:
-        """Return a result as a part of a page of HTML."""
+        """Return a result as a part of an HTML page."""
 
     def write_report(self, result: Any, file: str | PathLike[str]) -> None:
-        """Write a result's report."""
+        """Write the report of a result."""
 
 
 class Plain:
-    """A dataclass whose JSON is its fields."""
+    """A dataclass whose JSON has its fields."""
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the JSON: the fields, without those that are None."""
+        """Return the fields as JSON data, without those that are None."""
         return {name: value for name, value in vars(self).items() if value is not None}
 
 
 @public
 class Displayed:
-    """Something that a notebook displays, and that has a report."""
+    """An object that a notebook displays and that has a report."""
 
     def report(self, file: str | PathLike[str]) -> None:
         """Write verdict, tables, figures and settings as one HTML file.
 
-        Raises InputError where the name does not end in .html, or it cannot be written.
+        Raises InputError if the name does not end in .html, or if the file cannot be written.
         """
         _display().write_report(self, file)
 
@@ -57,7 +57,7 @@ class Displayed:
 
 
 class Result(Displayed):
-    """Something that a notebook displays, with a figure."""
+    """An object that a notebook displays, with a figure."""
 
     def plot(self) -> Figure:
         """Return the matplotlib Figure of the result; `.savefig(path)` writes it."""
@@ -65,28 +65,28 @@ class Result(Displayed):
 
 
 class Tabular:
-    """What is a table as well."""
+    """An object that can be converted to a table."""
 
     def to_polars(self) -> pl.DataFrame:
         """Return the table as a polars DataFrame."""
         raise NotImplementedError
 
     def to_pandas(self) -> Any:
-        """Return the table as a pandas DataFrame; raises InputError where pandas lacks."""
+        """Return the table as a pandas DataFrame. Raises InputError if pandas is not installed."""
         return pandas_frame(self.to_polars())
 
 
 class TableResult(Result, Tabular):
-    """A result that is a table as well."""
+    """A result with a table."""
 
 
 def _display() -> Display:
-    # By name: what knows all results lies above each of them.
+    # Imported by name: it depends on all result classes.
     return cast(Display, importlib.import_module("coupled.api.display"))
 
 
 def frame_of(rows: Sequence[Mapping[str, Any]], columns: Sequence[str] = ()) -> pl.DataFrame:
-    """Return rows of figures as a polars DataFrame, null for None; without rows, of `columns`."""
+    """Return rows as a polars DataFrame, null for None; with `columns` if there are no rows."""
     polars: Any = importlib.import_module("polars")
     if rows:
         frame: pl.DataFrame = polars.DataFrame(rows, infer_schema_length=None)
@@ -96,7 +96,7 @@ def frame_of(rows: Sequence[Mapping[str, Any]], columns: Sequence[str] = ()) -> 
 
 
 def pandas_frame(frame: pl.DataFrame) -> Any:
-    """Return a frame of polars as one of pandas; raises InputError where pandas lacks."""
+    """Return a polars frame as a pandas frame. Raises InputError if pandas is not installed."""
     try:
         pandas: Any = importlib.import_module("pandas")
     except ImportError:

@@ -1,8 +1,8 @@
-"""Tables of a TOML file as frozen, checked data; every fault is one line with its key.
+"""Tables of a TOML file as frozen, validated data; every error is one line with its key.
 
-A field's key in a file is its name and its unit: `travel` with unit `{d}` is
-`travel_m`, or `travel_rad` on a wheel. The data inside carry no unit in their name,
-so that one physics serves all controls.
+A field's key in a file is its name and its unit: `travel` with unit `{d}` is `travel_m`, or
+`travel_rad` for a wheel. The fields have no unit in their name, so that the code is the same for
+all controls.
 """
 
 from __future__ import annotations
@@ -33,9 +33,9 @@ class Section(BaseModel):
 
 
 class Given(Section):
-    """A section that Python code makes as well as a file: its keys are its fields' names.
+    """A section that can also be created in Python, with its field names as keywords.
 
-    What a file may not say is refused here too, as an InputError that names the class.
+    Values that a file may not have are refused here too, with an InputError that names the class.
     """
 
     def __init__(self, *positional: Any, **values: Any) -> None:
@@ -55,13 +55,13 @@ class Given(Section):
 
 
 class Lenient(Section):
-    """A section that another program may write more into: unknown keys are left out."""
+    """A section of a file that other programs may extend: unknown keys are ignored."""
 
     model_config = ConfigDict(extra="ignore")
 
 
 def plain_value(value: Any) -> Any:
-    """Return an array or a number of numpy, a tuple or a table, as a file would give it."""
+    """Return a numpy array or number, a tuple or a table as a value of a TOML file."""
     if isinstance(value, Mapping):
         return {key: plain_value(each) for key, each in value.items()}
     if hasattr(value, "tolist"):
@@ -70,33 +70,33 @@ def plain_value(value: Any) -> Any:
 
 
 S = TypeVar("S", bound=Section)
-LARGEST = 1e12  # no quantity of a rig or a record is larger, in SI
-SMALLEST = 1e-30  # nor any but zero smaller
+LARGEST = 1e12  # upper limit of all quantities of a rig or a record, in SI
+SMALLEST = 1e-30  # lower limit of nonzero sizes
 MOST_TOML_bytes = 2**20  # tomllib takes seconds for a MiB
-MOST_FAULTS = 20  # of one table that are named
+MOST_FAULTS = 20  # errors of one table that are reported
 MOST_DOTS = 100  # in a dotted key; tomllib's time grows with their square
 
 
 def quantity(unit: str, default: Any = ..., *, written: bool = False, **bounds: Any) -> Any:
     """Declare a field with a unit; `{d}` stands for the control's unit of deflection.
 
-    One that is `written` stands in every file that the package writes, at its default as well.
+    With `written`, the package writes it also at its default.
     """
     return Field(default, json_schema_extra={"unit": unit, "written": written}, **bounds)
 
 
 def derived(default: Any) -> Any:
-    """Declare a field that no file has: another section's values give it."""
+    """Declare a field that is not in files but computed from other sections."""
     return Field(default, json_schema_extra={"derived": True})
 
 
 def named(key: str, default: Any = ..., **bounds: Any) -> Any:
-    """Declare a field whose key in a file is a word that Python, or pydantic, keeps for itself."""
+    """Declare a field whose key in a file is reserved by Python or pydantic."""
     return Field(default, json_schema_extra={"key": key}, **bounds)
 
 
 def text_like(pattern: str, wanted: str) -> AfterValidator:
-    """Return what lets a text pass that matches a pattern; `wanted` is said of any other."""
+    """Return a validator for texts that match a pattern; `wanted` is for the error message."""
     matches = re.compile(pattern).fullmatch
 
     def check(text: str) -> str:
@@ -151,7 +151,7 @@ _TOKEN = re.compile(r""""(?:[^"\\]|\\.)*"|'[^']*'|[A-Za-z0-9_-]+|[ \t]+|.""", re
 
 
 def _dots(line: str) -> int:
-    """Return how many dots the longest dotted key of a line has."""
+    """Return the number of dots of the longest dotted key of a line."""
     most = dots = 0
     for match in _TOKEN.finditer(line):
         token = match[0]
@@ -164,7 +164,7 @@ def _dots(line: str) -> int:
 
 
 def known_keys(table: Any, keys: Mapping[str, object], file: object, path: str) -> dict[str, Any]:
-    """Return the table, once it is one and has only known keys."""
+    """Return the table, checked to be one and to have known keys only."""
     if not isinstance(table, dict):
         raise InputError(file, path, f"should be a table, is {shown_value(table)}")
     faults = []
@@ -185,7 +185,7 @@ def known_keys(table: Any, keys: Mapping[str, object], file: object, path: str) 
 
 
 def _other_unit(key: str, keys: Mapping[str, object]) -> str:
-    """Return the known key that has this key's name with another unit, or nothing."""
+    """Return the known key with the same name and another unit, or ""."""
     if len(key) > 100:
         return ""
     for known in sorted(keys, key=len, reverse=True):
@@ -243,7 +243,7 @@ def build(section: type[S], table: Any, file: object, path: str, d: str = "m") -
 
 
 def read_as(section: type[S], table: Any, file: object, path: str = "") -> S:
-    """Return what a program wrote, checked; `path` is the dotted place of the table in `file`.
+    """Return validated data of another program; `path` is the dotted place of the table in `file`.
 
     Raises InputError for each value that the section does not allow.
     """
@@ -257,9 +257,9 @@ def read_as(section: type[S], table: Any, file: object, path: str = "") -> S:
 
 
 def _made(section: type[S], values: Mapping[str, Any]) -> S:
-    """Return a section of values by field; raises pydantic's ValidationError.
+    """Return a section from values by field; raises pydantic's ValidationError.
 
-    A section that Python code makes names its class in faults; here the fault is a file's.
+    A section created in Python names its class in errors; here the error is that of a file.
     """
     made = section.__new__(section)
     BaseModel.__init__(made, **values)
@@ -267,7 +267,7 @@ def _made(section: type[S], values: Mapping[str, Any]) -> S:
 
 
 def faults_of(error: ValidationError, section: type[Section], name: str) -> InputError:
-    """Return the faults of a section that Python code makes, by its fields' names."""
+    """Return the errors of a section that is created in Python, by its field names."""
     return _first_fault(error, {field: field for field in section.model_fields}, name, "")
 
 
@@ -283,9 +283,9 @@ def grouped(changes: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
 def changed(
     section: S, changes: Mapping[str, Any], file: object, path: str = "", d: str = "m"
 ) -> S:
-    """Return a section with some values replaced, {dotted key of a file: value}, and checked.
+    """Return a section with some values replaced, {dotted key of a file: value}, validated.
 
-    A value may be a whole section, or the table of one. Faults are those of a file's table.
+    A value may be a whole section, or the table of one. Errors are those of a file's table.
     """
     keys = file_keys(type(section), d)
     groups = grouped(changes)
@@ -342,7 +342,7 @@ def _refuse_unreal(value: Any, file: object, key: str) -> None:
             )
 
 
-# What is said of a value in place of the words of Python.
+# Messages that replace those of pydantic.
 _WANTED = {
     **dict.fromkeys(("dict_type", "model_type", "mapping_type"), "should be a table"),
     **dict.fromkeys(("list_type", "tuple_type"), "should be a list"),
@@ -359,7 +359,7 @@ def _first_fault(
 def _faults(
     error: ValidationError, keys: Mapping[str, str], file: object, path: str
 ) -> list[InputError]:
-    """Return each fault that a section's values have, under its key in the file."""
+    """Return each error of a section's values, with its key in the file."""
     by_field = {field: key for key, field in keys.items()}
     found: dict[str, InputError] = {}
     for fault in error.errors():

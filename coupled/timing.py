@@ -1,6 +1,6 @@
-"""Where a command's processor time goes; `coupled --timing`, which the help leaves out, prints it.
+"""Processor time of a command by part, printed by the hidden option `coupled --timing`.
 
-What is done before the first part that is timed is loading modules and reading files.
+The time before the first timed part is for loading modules and reading files.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ _spent: dict[str, float] = {}
 
 @contextmanager
 def timed(part: str) -> Iterator[None]:
-    """Count what is done within as spent on a part; parts do not stand within each other."""
+    """Add the processor time of this context to a part; parts are not nested."""
     start = time.process_time()
     if not _began:
         _began.append(start)
@@ -26,7 +26,7 @@ def timed(part: str) -> Iterator[None]:
 
 
 def parts() -> dict[str, float]:
-    """Return processor seconds of each part so far, loading first, all else last."""
+    """Return the processor seconds of each part, loading first, the rest last."""
     now = time.process_time()
     loading = _began[0] if _began else now
     return {"load": loading, **_spent, "rest": now - loading - sum(_spent.values())}

@@ -1,10 +1,10 @@
-"""Factors from the units of the field's edges to SI: multiply by them to get SI.
+"""Conversion factors to SI: multiply by them.
 
-All are exact by definition, and stand here as numbers: a library of constants takes longer to
-load than an aircraft. A test holds them equal to scipy's.
+All are exact by definition, and written here as numbers, since libraries of constants load slowly.
+A test compares them with scipy's.
 
-The units that a user's own log may be in stand in a table of names, with their dimension,
-so that inches of force are refused and not multiplied.
+The units of a user's own log are in a table of names with their dimensions, so that inches of a
+force are refused.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ MILLISECOND_s: Final[float] = 1e-3
 
 Dimension = tuple[int, int, int, int]  # powers of mass, length, time, angle
 
-# An angle is a dimension of its own here: a log in degrees must not pass for a bare number.
+# An angle has its own dimension: a log in degrees must not pass for a number without unit.
 _NONE: Final[Dimension] = (0, 0, 0, 0)
 _FORCE: Final[Dimension] = (1, 1, -2, 0)
 _TORQUE: Final[Dimension] = (1, 2, -2, 0)
@@ -63,7 +63,7 @@ class Unit:
 
     @property
     def word(self) -> str:
-        """What a quantity in this unit is, for people."""
+        """The quantity of this unit, in words."""
         return _WORDS.get(self.dimension, "another quantity")
 
 
@@ -107,7 +107,7 @@ _NAMED: Final[dict[str, Unit]] = {
     }.items()
     for name, factor in units.items()
 }
-# Quotients that a message may propose; any other of two named units is understood as well.
+# Quotients proposed in messages; other quotients of two known units are accepted as well.
 _QUOTIENTS: Final = (
     *("m/s", "km/h", "ft/s", "rad/s", "deg/s", "m/s^2", "ft/s^2"),
     *("N/m", "N/mm", "daN/cm", "lbf/in", "lbf/ft", "N/rad", "N/deg", "lbf/rad", "lbf/deg"),
@@ -132,10 +132,10 @@ _TIMES: Final = re.compile(r"(?<=[A-Za-z])(?: *[·⋅*.-] *| +)(?=[A-Za-z])")
 
 
 def parse_unit(text: str) -> Unit | None:
-    """Return the unit that a text like `lbf/in`, `[deg/s]`, `ft-lb` or `m/s²` means, or nothing.
+    """Return the unit of a text like `lbf/in`, `[deg/s]`, `ft-lb` or `m/s²`, or None.
 
-    A product is read factor by factor: `m·N` is a torque, and not the millinewton `mN`. It stands
-    before a `/` only, since `N/mm·s` has two meanings.
+    A product is read factor by factor: `m·N` is a torque, and not the millinewton `mN`. Products
+    are allowed before a `/` only, since `N/mm·s` is ambiguous.
     """
     plain = text.strip().strip("[]()").strip()
     plain = plain.replace("°", "deg").replace("²", "^2").replace("µ", "u")

@@ -20,7 +20,7 @@ import pytest
 
 from coupled.cli.process import Stop, was_interrupted
 from coupled.cli.progress import MARK, progress
-from coupled.parallel import Here, as_done, executor
+from coupled.parallel import SerialExecutor, as_done, executor
 from tests.support.commands import coupled
 from tests.support.processes import PATIENCE_s, begun
 from tests.support.runs import SHORT
@@ -226,7 +226,7 @@ def test_each_job_is_done_once_and_few_wait() -> None:
         asked.append(job)
         return 2 * job
 
-    assert list(as_done(Here(), double, jobs(), ahead=1)) == list(range(0, 20, 2))
+    assert list(as_done(SerialExecutor(), double, jobs(), ahead=1)) == list(range(0, 20, 2))
     assert asked == list(range(10))
 
 
@@ -282,4 +282,4 @@ def test_work_in_the_command_s_own_process_is_interrupted_too() -> None:
         signal.raise_signal(signal.SIGINT)
 
     with Stop(), pytest.raises(KeyboardInterrupt):
-        list(as_done(Here(), press, [(1,)], 1))
+        list(as_done(SerialExecutor(), press, [(1,)], 1))

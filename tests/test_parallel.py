@@ -9,7 +9,7 @@ import time
 import numpy as np
 import pytest
 
-from coupled.parallel import HaltedError, go_on, in_threads, threads
+from coupled.parallel import WorkCancelledError, go_on, in_threads, threads
 
 
 def test_several_threads_return_what_one_returns_in_the_same_order() -> None:
@@ -77,7 +77,7 @@ def test_a_fault_is_raised_where_the_work_was_asked_for_and_halts_the_rest() -> 
             while True:
                 go_on()
                 time.sleep(0.001)
-        except HaltedError:
+        except WorkCancelledError:
             halted.set()
             raise
 
@@ -101,7 +101,7 @@ def test_a_fault_halts_the_work_within_the_others_work() -> None:
             raise KeyError("broken")
         try:
             in_threads(inner, range(2))
-        except HaltedError:
+        except WorkCancelledError:
             halted.set()
             raise
 

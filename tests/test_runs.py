@@ -11,7 +11,7 @@ import pytest
 from coupled.api.rigs import load_rig
 from coupled.authority.compare import Comparison, Flight, compare
 from coupled.calibration.checks import swing_of
-from coupled.calibration.letgo import scheduled
+from coupled.calibration.releaseschedule import schedule_for_release
 from coupled.calibration.sweeps import Release
 from coupled.campaign.standards import judge_standard
 from coupled.flight.runfile import read_run
@@ -182,7 +182,7 @@ def test_the_bounds_of_the_release_are_the_rules_about_the_rigid_stick() -> None
 @pytest.mark.slow
 def test_the_table_of_the_release_is_what_the_remedy_finds() -> None:
     filed = read_run("release")[2].rig.controls["column"].compensation
-    found = scheduled(load_rig("t37"), "column").controls["column"].compensation
+    found = schedule_for_release(load_rig("t37"), "column").controls["column"].compensation
     assert filed.inertia_gradient == found.inertia_gradient
     assert filed.force_lead == found.force_lead
     assert filed.mass_factor == filed.damping_factor == found.mass_factor == found.damping_factor

@@ -39,7 +39,7 @@ ORDER = [
     "display",
     "files",
     "outputs",
-    "turns",
+    "callpool",
     "parallel",
     "schema",
     "arguments",

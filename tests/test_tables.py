@@ -16,12 +16,12 @@ from coupled.cli.terminal import SafeConsole
 from coupled.display import drawn
 from coupled.flight.expectation import Figure
 from coupled.reports.check import check_report
-from coupled.reports.page import Made, Report, Section, render
+from coupled.reports.page import Provenance, Report, Section, render
 from coupled.reports.page import Verdict as Sentence
 from coupled.tables.campaign import verdict_tables
 from coupled.tables.table import Mark, Table
 
-MADE = Made("coupled", (), ())
+MADE = Provenance("coupled", (), ())
 TABLE = Table(
     ("", "found, N", "", "remark"),
     (

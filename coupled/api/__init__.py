@@ -1,1 +1,1 @@
-"""The front door: what `coupled` offers in Python. Thin: each function calls one room."""
+"""The public Python functions of `coupled`: they check arguments and call subpackages."""

@@ -1,4 +1,4 @@
-"""Analyses of a rig: its authority maps, its stability."""
+"""Analyses of a rig: authority maps and stability."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from os import PathLike
 from coupled.api.records import Given, named_records
 from coupled.api.rigs import rig_given
 from coupled.arguments import public
-from coupled.authority.stability.whole import Stability, compliant_controls, map_stability
-from coupled.authority.whole import AuthorityMap, map_rig
+from coupled.authority.authoritymap import AuthorityMap, map_rig
+from coupled.authority.stability.stabilitymap import Stability, compliant_controls, map_stability
 from coupled.errors import InputError
 from coupled.record.channels import ControlName
 from coupled.rig.rig import Rig
@@ -47,7 +47,7 @@ def map_authority(
 def stability(
     rig: Rig | Path, control: ControlName | None = None, progress: Progress | None = None
 ) -> Stability:
-    """Map where a rig is stable over K·G_T, simulated and by linear theory.
+    """Map where a rig is stable over K·G_T, by simulation and by linear theory.
 
     `control` selects one control (default: each with a bend). Some thousand motions of each are
     simulated, which takes about a minute. Raises InputError if no control has a bend.

@@ -1,4 +1,4 @@
-"""The virtual bench: plan readings, and take them."""
+"""The virtual bench: plan readings, and simulate them."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from coupled.api.rigs import rig_given
 from coupled.arguments import public
 from coupled.calibration.bench import NULLS, CalibrationBench, take_readings
 from coupled.calibration.calibrate import DEFAULT_RIG
-from coupled.calibration.crossed import crossed_forces
+from coupled.calibration.crossforces import crossed_forces
 from coupled.calibration.estimate import Instruments, usual_instruments
 from coupled.calibration.plan import STRONGEST_N, fewest, stations
-from coupled.calibration.planned import ReadingsPlan, plan_readings
 from coupled.calibration.readings import Readings
 from coupled.calibration.readingsfile import write_readings
+from coupled.calibration.readingsplan import ReadingsPlan, plan_readings
 from coupled.errors import InputError, nearest, shown_value
 from coupled.files import check_target, write_text
 from coupled.record.channels import ControlName
@@ -38,7 +38,7 @@ def plan(
     file: str | PathLike[str] | None = None,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> ReadingsPlan:
-    """Plan the fewest readings that give K to ± `precision` of it, 95 %.
+    """Plan the fewest readings that give K with a 95 % interval of ± `precision`, relative.
 
     `strongest_N` is the largest hand force. `once`: ruler and scale are read once, not again after
     the voltmeter. `crossed_N` is a force of both signs held on each other control. `instruments`
@@ -50,7 +50,7 @@ def plan(
     >>> plan.reached.half_width < 0.05
     True
     """
-    data, tools = _asked(rig, control, instruments)
+    data, tools = _checked_inputs(rig, control, instruments)
     asked = {"precision": precision, "strongest_N": strongest_N, "crossed_N": crossed_N}
     _check_ranges("coupled.plan", asked)
     target = _csv(file)
@@ -71,8 +71,8 @@ RANGES = {
 }
 
 
-class Taking(TypedDict, total=False):
-    """How readings are taken."""
+class ReadingOptions(TypedDict, total=False):
+    """Options of the readings."""
 
     nulls: int
     once: bool
@@ -91,7 +91,7 @@ def bench(
     precision: float | None = None,
     seed: int = 0,
     file: str | PathLike[str] | None = None,
-    **taking: Unpack[Taking],
+    **taking: Unpack[ReadingOptions],
 ) -> Readings:
     """Simulate calibration readings of a rig by ruler, spring scale and voltmeter.
 
@@ -99,8 +99,8 @@ def bench(
     determines K to ± that share. The readings are written to `file`, a CSV. `calibrate` accepts the
     result. Raises InputError if the rig lacks the control.
 
-    Further keywords: `nulls` for S2 (6); `once`, `crossed_N`, `strongest_N` and `instruments` as
-    `plan` has them.
+    Further keywords: `nulls` for S2 (6); `once`, `crossed_N`, `strongest_N` and `instruments` as in
+    `plan`.
 
     >>> import coupled
     >>> readings = coupled.bench("report-column", gradients=3, deflections=3)
@@ -108,8 +108,8 @@ def bench(
     Readings(9 readings in 3 gradient sets, 6 nulls)
     >>> found = coupled.calibrate(readings, "report-column")
     """
-    known_keys(dict(taking), dict.fromkeys(Taking.__annotations__), "coupled.bench", "")
-    data, tools = _asked(rig, control, taking.get("instruments"))
+    known_keys(dict(taking), dict.fromkeys(ReadingOptions.__annotations__), "coupled.bench", "")
+    data, tools = _checked_inputs(rig, control, taking.get("instruments"))
     asked = {"gradients": gradients, "deflections": deflections, "precision": precision, **taking}
     _check_ranges("coupled.bench", asked)
     target, once = _csv(file), taking.get("once", False)
@@ -128,17 +128,17 @@ def bench(
 
 
 def _check_ranges(function: str, given: Mapping[str, object]) -> None:
-    """Refuse a number that is outside its range."""
+    """Refuse a number outside its range."""
     for name, value in given.items():
         low, high = RANGES.get(name, (-inf, inf))
         if isinstance(value, Real) and not low <= float(value) <= high:
             raise InputError(function, name, f"is {shown_value(value)}; give {low:g} to {high:g}")
 
 
-def _asked(
+def _checked_inputs(
     rig: Rig | str | PathLike[str], control: ControlName, instruments: Instruments | None
 ) -> tuple[Rig, Instruments]:
-    """Return the rig, which has the control, and the instruments."""
+    """Return the rig, checked to have the control, and the instruments."""
     data = rig_given(rig)
     data.check_controlled(data.file)
     if control not in data.controls:
@@ -148,7 +148,7 @@ def _asked(
 
 
 def _csv(file: str | PathLike[str] | None) -> Path | None:
-    """Return where a CSV is to be written, checked."""
+    """Return the path of a CSV file to write, checked."""
     if file is None:
         return None
     path = Path(file)

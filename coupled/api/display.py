@@ -1,6 +1,7 @@
-"""How each result becomes a figure, a part of a notebook, and a report: in one place.
+"""The figure, notebook display and report of each class of result.
 
-`DISPLAYS` has a line a result. A notebook gets the verdict and the first sections of the report.
+`DISPLAYS` has one entry per class. A notebook shows the verdict and the first sections of the
+report.
 """
 
 from __future__ import annotations
@@ -12,12 +13,12 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+from coupled.authority.authoritymap import AuthorityMap
 from coupled.authority.compare import Comparison, Flight
-from coupled.authority.stability.whole import Stability
-from coupled.authority.whole import AuthorityMap
+from coupled.authority.stability.stabilitymap import Stability
 from coupled.calibration.forcedocument import ForceDocument
-from coupled.calibration.planned import ReadingsPlan
 from coupled.calibration.readings import Readings
+from coupled.calibration.readingsplan import ReadingsPlan
 from coupled.calibration.result import CalibrationResult
 from coupled.campaign.check import CheckResult
 from coupled.campaign.sweep import SweepResult
@@ -33,11 +34,11 @@ from coupled.plots.gaps import shown_parts
 from coupled.plots.gapview import View
 from coupled.plots.histories import Figure, draw_record
 from coupled.plots.ladder import draw_ladder
+from coupled.plots.raw_readings import draw_raw_readings
 from coupled.plots.readings import draw_readings
 from coupled.plots.results import draw_result
 from coupled.plots.rigs import draw_rig
 from coupled.plots.saving import make_drawable, with_note
-from coupled.plots.taken import draw_taken
 from coupled.plots.verdicts import draw_verdicts
 from coupled.record.record import Record
 from coupled.reports.analyses import (
@@ -53,44 +54,44 @@ from coupled.reports.check import check_report
 from coupled.reports.comparison import comparison_report
 from coupled.reports.diagnosis import diagnosis_report
 from coupled.reports.forces import force_report, force_summary
-from coupled.reports.made import made_by
-from coupled.reports.page import InputFile, Made, Report, render, render_part
+from coupled.reports.page import InputFile, Provenance, Report, render, render_part
+from coupled.reports.provenance import provenance_of
 from coupled.reports.records import draw_flight, fit_report, flight_report, record_report
 from coupled.reports.rigs import export_report, rig_report, survey_report, terms_report
 from coupled.reports.sweep import sweep_report
 from coupled.rig.guesses import guess_note
 from coupled.rig.rig import Rig
+from coupled.surveying.modelsurvey import Survey
 from coupled.surveying.terms import ModelTerms
-from coupled.surveying.whole import Survey
 
 _ALL = 100  # sections
 
 
 @dataclass(frozen=True)
-class _Way:
-    """How a kind of result is reported and drawn; a notebook shows so many sections."""
+class _Display:
+    """The report and figure functions of a class, and the number of sections in a notebook."""
 
-    report: Callable[[Any, Made], Report]
+    report: Callable[[Any, Provenance], Report]
     draw: Callable[[Any], Figure] | None = None
     sections: int = _ALL
     rig: Callable[[Any], Rig | None] = lambda result: None
-    brief: Callable[[Any, Made], Report] | None = None  # for a notebook, where the report is long
+    brief: Callable[[Any, Provenance], Report] | None = None  # for notebooks
 
 
-def _diagnosed(found: Diagnosis, made: Made) -> Report:
+def _diagnosed(found: Diagnosis, made: Provenance) -> Report:
     return diagnosis_report(found, ", ".join(Path(name).name for name in found.records), made)
 
 
-_DIAGNOSIS = _Way(
+_DIAGNOSIS = _Display(
     _diagnosed,
     lambda found: draw_ladder(View(shown_parts(found)[0])),
     rig=lambda found: found.nominal,
 )
-DISPLAYS: dict[type, _Way] = {
-    Rig: _Way(rig_report, draw_rig, rig=lambda rig: rig),
-    Record: _Way(record_report, draw_record, 1),
-    Flight: _Way(flight_report, draw_flight, rig=lambda flight: flight.manoeuvre.rig),
-    Comparison: _Way(
+DISPLAYS: dict[type, _Display] = {
+    Rig: _Display(rig_report, draw_rig, rig=lambda rig: rig),
+    Record: _Display(record_report, draw_record, 1),
+    Flight: _Display(flight_report, draw_flight, rig=lambda flight: flight.manoeuvre.rig),
+    Comparison: _Display(
         lambda found, made: comparison_report(found.flights, made),
         lambda found: draw_comparison(found.flights),
         3,
@@ -98,32 +99,32 @@ DISPLAYS: dict[type, _Way] = {
     ),
     PartDiagnosis: _DIAGNOSIS,
     WholeDiagnosis: _DIAGNOSIS,
-    NominalFit: _Way(fit_report, draw_fit, rig=lambda found: found.rig),
-    SweepResult: _Way(sweep_report, draw_result),
-    CheckResult: _Way(check_report, draw_verdicts),
-    CalibrationResult: _Way(
+    NominalFit: _Display(fit_report, draw_fit, rig=lambda found: found.rig),
+    SweepResult: _Display(sweep_report, draw_result),
+    CheckResult: _Display(check_report, draw_verdicts),
+    CalibrationResult: _Display(
         lambda found, made: calibration_report(found, "", "readings", "", made),
         lambda found: draw_readings(found, "readings"),
         2,
     ),
-    AuthorityMap: _Way(map_report, draw_map, rig=lambda found: found.rig),
-    Stability: _Way(stability_report, draw_planes, rig=lambda found: found.rig),
-    ForceDocument: _Way(
+    AuthorityMap: _Display(map_report, draw_map, rig=lambda found: found.rig),
+    Stability: _Display(stability_report, draw_planes, rig=lambda found: found.rig),
+    ForceDocument: _Display(
         lambda found, made: force_report(found.controls, found.fits, found.issue, made),
         lambda found: draw_static_checks(found.controls[0]),
         rig=lambda found: found.rig,
         brief=lambda found, made: force_summary(found.controls, found.issue, made),
     ),
-    ReadingsPlan: _Way(plan_report, rig=lambda found: found.rig),
-    Readings: _Way(readings_report, draw_taken),
-    Survey: _Way(survey_report),
-    ModelTerms: _Way(terms_report),
-    Export: _Way(export_report, rig=lambda found: found.rig),
+    ReadingsPlan: _Display(plan_report, rig=lambda found: found.rig),
+    Readings: _Display(readings_report, draw_raw_readings),
+    Survey: _Display(survey_report),
+    ModelTerms: _Display(terms_report),
+    Export: _Display(export_report, rig=lambda found: found.rig),
 }
 
 
 def draw(result: Any) -> Figure:
-    """Return a result's figure."""
+    """Return the figure of a result."""
     way = DISPLAYS[type(result)]
     assert way.draw is not None
     figure = way.draw(result)
@@ -135,14 +136,14 @@ def draw(result: Any) -> Figure:
 
 
 def html(result: Any) -> str:
-    """Return a result as a part of a page of HTML, which stands alone."""
+    """Return a result as a self-contained part of an HTML page."""
     way = DISPLAYS[type(result)]
     report = way.brief or way.report
     return render_part(_noted(report(result, _made(result)), result), way.sections)
 
 
 def write_report(result: Any, file: str | PathLike[str]) -> None:
-    """Write a result's report. Raises InputError for a file that is no HTML, or cannot be made."""
+    """Write the report of a result. Raises InputError if `file` is not .html or not writable."""
     path = Path(file)
     if path.suffix.lower() not in (".html", ".htm"):
         raise InputError(path, "", "a report is one HTML file: its name ends in .html")
@@ -151,25 +152,25 @@ def write_report(result: Any, file: str | PathLike[str]) -> None:
 
 
 def _guesses(result: Any) -> str:
-    """Return which numbers of a result's rig are guesses, a sentence or nothing."""
+    """Return a sentence on the assumed values of the result's rig, or ""."""
     rig = DISPLAYS[type(result)].rig(result)
     return "" if rig is None else guess_note(rig.controls)
 
 
 def _noted(report: Report, result: Any) -> Report:
-    """Return a report whose verdict names the guesses of the rig, unless it does so already."""
+    """Return a report whose verdict names the assumed values of the rig, once."""
     note, said = _guesses(result), report.verdict.remarks
     if not note or any("Guesses, not measurements" in remark for remark in said):
         return report
     return replace(report, verdict=replace(report.verdict, remarks=(*said, note)))
 
 
-def _made(result: Any) -> Made:
-    """Return what made a result: with the text of its rig, as it was."""
-    made = made_by(f"coupled, from Python: {type(result).__name__}", [])
+def _made(result: Any) -> Provenance:
+    """Return the provenance of a result, with the text of its rig."""
+    made = provenance_of(f"coupled, from Python: {type(result).__name__}", [])
     rig = DISPLAYS[type(result)].rig(result)
     if rig is None:
         return made
     text = rig.to_toml()
     digest = hashlib.sha256(text.encode()).hexdigest()
-    return Made(made.command, made.versions, (InputFile(f"{rig.name}.toml", digest, text),))
+    return Provenance(made.command, made.versions, (InputFile(f"{rig.name}.toml", digest, text),))

@@ -1,4 +1,4 @@
-"""A rig's loader taken to JSBSim, or to any simulator that imports an FMU."""
+"""Export of the loader of a rig to JSBSim, or as an FMU."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def export(
     check: bool = True,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> Export:
-    """Write a rig's loader as JSBSim systems, with the aircraft and scripts that JSBSim flies.
+    """Write the loader of a rig as JSBSim systems, with the aircraft and scripts for JSBSim.
 
     `folder` is new, or an earlier export. `runs` get a script each (the shipped runs of the rig's
     name unless given); with `case` the rig is exported as that case of them has it.
@@ -67,9 +67,9 @@ def export_fmu(
 ) -> Fmu:
     """Write the loader, linkage, sensing and compensation of a control as an FMU.
 
-    `file` ends in .fmu; it is for co-simulation on this platform, by FMI 3.0 or 2.0. A rig of
-    several controls needs one named. Needs a C compiler. Raises InputError without one, for a file
-    that cannot be written, and for a control that the rig does not have.
+    `file` ends in .fmu; the FMU is for co-simulation on this platform, by FMI 3.0 or 2.0. `control`
+    is required if the rig has several controls. Needs a C compiler. Raises InputError without one,
+    for a file that cannot be written, and for an unknown control.
 
     >>> import coupled
     >>> coupled.export_fmu("t37", "t37.fmu")

@@ -25,8 +25,8 @@ Path = str | PathLike[str]
 Gradients = Law | Mapping[ControlName, Law]
 
 
-class Terms(TypedDict, total=False):
-    """What else a flight from Python may be given; tables as in a run file, by its keys."""
+class FlightKeywords(TypedDict, total=False):
+    """Further keywords of a flight; tables have the keys of a run file."""
 
     seed: int
     dynamic_pressure_Pa: float | PressureProfile
@@ -40,9 +40,9 @@ class Terms(TypedDict, total=False):
 
 @public
 def load_run(run: Path) -> list[Manoeuvre]:
-    """Return the cases of a run file, or of a shipped run by its name: a manoeuvre each.
+    """Return the manoeuvres of a run file, or of a shipped run by name, one per case.
 
-    Raises InputError for what cannot be flown, naming file and key.
+    Raises InputError with file and key for a run that cannot be flown.
 
     >>> import coupled
     >>> cases = coupled.load_run("pull-up-t37")
@@ -65,9 +65,9 @@ def fly(
     duration_s: float | None = None,
     configuration: Configuration | None = None,
     progress: Callable[[int, int], None] | None = None,
-    **terms: Unpack[Terms],
+    **terms: Unpack[FlightKeywords],
 ) -> Flight:
-    """Fly a rig under a pilot on each control given, and return the flight.
+    """Fly a rig with a pilot on each given control, and return the flight.
 
     `what` is a rig, its file, the name of a shipped one, or a manoeuvre, which has all other
     arguments itself. A pilot is `Step`, `Ramp`, `Doublet`, `ThreeTwoOneOne`, `FrequencySweep`,
@@ -76,17 +76,17 @@ def fly(
     or `calibrated low`; without it the rig flies as it is. `progress` is called with frames done
     and frames in all.
 
-    A pilot may also be a function of the `State` at t_k, called once a frame; it returns the force
-    over the frame, N. `gradient` is a function of the state that returns G_T, N per m (rad on a
-    wheel), in place of the rig's schedule; of several controls, a table by control. If a function
-    has a function `reset`, it is called at the start of each flight.
+    A pilot may also be a function of the `State` at t_k, called once per frame; it returns the
+    force over the frame, N. `gradient` is a function of the state that returns G_T, N per m (rad
+    for a wheel), and replaces the schedule of the rig; for several controls, give a table by
+    control. If a function has an attribute `reset`, it is called at the start of each flight.
 
-    Further keywords: `seed` (0); `dynamic_pressure_Pa`, a number or a `PressureProfile`, for a
-    rig without aircraft; `wind`, `gust`, `turbulence` and `event`, tables as in a run file;
+    Further keywords: `seed` (0); `dynamic_pressure_Pa`, a number or a `PressureProfile`, for a rig
+    without aircraft; `wind`, `gust`, `turbulence` and `event`, tables as in a run file;
     `record_properties`, of JSBSim; `name`.
 
-    The `Flight` has `.record` (SI, a row a frame), `.outcome` (loss, felt ratio, greatest
-    force and rate) and `.ended_early`. Raises InputError as a run file would.
+    The `Flight` has `.record` (SI, one row per frame), `.outcome` (loss, felt ratio, greatest force
+    and rate) and `.ended_early`. Raises InputError as for a run file.
 
     >>> import coupled
     >>> flight = coupled.fly("t37", column=coupled.Step(force_N=50), duration_s=3)
@@ -117,13 +117,13 @@ def compare(
     duration_s: float | None = None,
     configurations: Sequence[Configuration] | None = None,
     progress: Callable[[str, int, int], None] | None = None,
-    **terms: Unpack[Terms],
+    **terms: Unpack[FlightKeywords],
 ) -> Comparison:
     """Fly a rig rigid, uncompensated, with each correction and with both; return the flights.
 
-    Takes what `fly` takes, and the cases of a run (`load_run`). `configurations` are some of
-    those that `fly` takes, the first five unless given. `progress` is called with what is flown,
-    frames done and frames in all.
+    Takes the arguments of `fly`, and the cases of a run (`load_run`). `configurations` are some of
+    those of `fly` (default: the first five). `progress` is called with a label and with the flown
+    and the total number of frames.
 
     The `Comparison` is a sequence of `Flight`; `.loss("uncompensated")` is the share of the surface
     command lost, `.felt_ratio(…)` force felt over force specified, `.flight(…)` the flight; with
@@ -143,7 +143,7 @@ def compare(
     pilots = pilots_of(column, wheel, pedals)
     if isinstance(what, Sequence) and not isinstance(what, str):
         for manoeuvre in what:
-            _alone(manoeuvre, pilots, duration_s, gradient, terms)
+            _refuse_keywords(manoeuvre, pilots, duration_s, gradient, terms)
         cases = list(what)
         if not cases:
             raise InputError("coupled.compare", "what", "needs at least one manoeuvre")
@@ -157,7 +157,7 @@ def compare(
 def pilots_of(
     column: Pilot | Law | None, wheel: Pilot | Law | None, pedals: Pilot | Law | None
 ) -> dict[ControlName, Pilot]:
-    """Return the pilots given, by their controls."""
+    """Return the given pilots by control."""
     given = zip(CONTROL_NAMES, (column, wheel, pedals), strict=True)
     return {control: as_pilot(pilot) for control, pilot in given if pilot is not None}
 
@@ -167,14 +167,14 @@ def manoeuvre_of(
     pilots: Mapping[ControlName, Pilot],
     duration_s: float | None,
     gradient: Gradients | None,
-    terms: Terms,
+    terms: FlightKeywords,
 ) -> Manoeuvre:
-    """Return the manoeuvre that keywords say."""
+    """Return the manoeuvre of these arguments."""
     if isinstance(what, Manoeuvre):
-        _alone(what, pilots, duration_s, gradient, terms)
+        _refuse_keywords(what, pilots, duration_s, gradient, terms)
         return what
     name = terms.get("name", "manoeuvre")
-    words = (*CONTROL_NAMES, "gradient", "duration_s", *Terms.__annotations__)
+    words = (*CONTROL_NAMES, "gradient", "duration_s", *FlightKeywords.__annotations__)
     known_keys(dict(terms), dict.fromkeys(words), name, "")
     rig = what if isinstance(what, Rig) else load_rig(what)
     if duration_s is None:
@@ -201,7 +201,7 @@ def manoeuvre_of(
 
 
 def _laws(given: Gradients | None, rig: Rig, name: str) -> Mapping[ControlName, Law]:
-    """Return the scheduling laws of a rig's controls; a function alone is that of its only one."""
+    """Return the scheduling law of each control; a single function is for the only control."""
     if given is None or isinstance(given, Mapping):
         return dict(given or {})
     first, *others = rig.controls
@@ -211,12 +211,12 @@ def _laws(given: Gradients | None, rig: Rig, name: str) -> Mapping[ControlName, 
     return {first: given}
 
 
-def _alone(
+def _refuse_keywords(
     manoeuvre: Manoeuvre,
     pilots: Mapping[ControlName, Pilot],
     duration_s: float | None,
     gradient: Gradients | None,
-    terms: Terms,
+    terms: FlightKeywords,
 ) -> None:
     """Refuse keywords with a manoeuvre, which has all values itself."""
     alone = {"duration_s": duration_s, "gradient": gradient}

@@ -1,4 +1,4 @@
-"""Diagnosis and fit: hold records against their rig."""
+"""Diagnosis of records, and fit of a rig to records."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def diagnose(
     healthy: Given | Sequence[Given] | Mapping[str, Given] | None = None,
     terms: bool = False,
 ) -> Diagnosis:
-    """Diagnose a mismatch between simulation and record: where, which effect, how large.
+    """Diagnose the difference between simulation and record: which stage and effect, what size.
 
     `rig` is the records' rig: a rig, its file, or the name of a shipped rig; None for that of the
     manifest beside the records. Its aircraft is trimmed at the records' initial condition.
@@ -67,7 +67,7 @@ def diagnose(
 
 
 def _check_twice(records: Sequence[tuple[str, Record]]) -> None:
-    """Raise InputError if two records hold the same numbers."""
+    """Raise InputError if two records have the same data."""
     for k, (name, record) in enumerate(records):
         for _, other in records[:k]:
             if record.channels == other.channels and np.array_equal(record.data, other.data):

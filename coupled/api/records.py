@@ -19,10 +19,10 @@ Given = Record | DataFrame | str | PathLike[str]
 
 @public
 def read_record(path: str | PathLike[str]) -> Record:
-    """Return the record of a CSV or Parquet file, and its manifest where there is one.
+    """Return the record of a CSV or Parquet file, with its manifest if there is one.
 
-    Channels are in SI, named with their units; `time_s` must be there and rise. Raises
-    InputError for a file that holds no record, naming file, column and row.
+    Channels are in SI, with units in their names; `time_s` is required and must increase. Raises
+    InputError with file, column and row for an invalid file.
 
     >>> import coupled, tempfile, pathlib
     >>> flight = coupled.fly("t37", column=coupled.Step(force_N=20, start_s=0), duration_s=1)
@@ -38,10 +38,10 @@ def read_record(path: str | PathLike[str]) -> Record:
 
 @public
 def write_record(record: Record | DataFrame, path: str | PathLike[str]) -> None:
-    """Write a record as CSV or Parquet, by the path's extension, and a manifest beside it.
+    """Write a record as CSV or Parquet, by the extension of the path, and its manifest.
 
-    A DataFrame is written as the record that it holds (`Record.from_frame`). Both files appear, or
-    neither. Raises InputError for another extension, and where it cannot be written.
+    A DataFrame is converted to a record (`Record.from_frame`). Either both files are written or
+    none. Raises InputError for another extension, and for a path that cannot be written.
 
     >>> import coupled, tempfile, pathlib
     >>> flight = coupled.fly("t37", column=coupled.Step(force_N=20), duration_s=1)
@@ -93,7 +93,7 @@ def import_log(
 
 
 def named_records(records: Given | Sequence[Given] | Mapping[str, Given]) -> dict[str, Record]:
-    """Return records by the name that a fault is to say: the file's, or a number."""
+    """Return records by the name for error messages: the file, or a number."""
     if isinstance(records, (Record, DataFrame, str, PathLike)):
         records = [records]
     if not records:
@@ -111,7 +111,7 @@ def named_records(records: Given | Sequence[Given] | Mapping[str, Given]) -> dic
 
 
 def _record(given: Given, name: str) -> Record:
-    """Return a record given as such, which is checked as a file's is, as a DataFrame, or a file."""
+    """Return a record from a `Record`, a DataFrame or a file, with the checks of a file."""
     if isinstance(given, Record):
         return record_of({each: given[each] for each in given.channels}, name, given.manifest)
     return Record.from_frame(given) if isinstance(given, DataFrame) else read_record(given)

@@ -1,4 +1,4 @@
-"""Rigs: load one, draft one for an aircraft, survey the aircraft that there are."""
+"""Rigs: load one, draft one for an aircraft, survey the available aircraft."""
 
 from __future__ import annotations
 
@@ -12,17 +12,16 @@ from coupled.rig.rig import Rig, of_file
 from coupled.rig.rigfile import read_rig, rig_from_table
 from coupled.schema import loads_toml
 from coupled.surveying.draft import draft
+from coupled.surveying.modelsurvey import Survey, survey_models
 from coupled.surveying.survey import chosen_model, surveyed
 from coupled.surveying.terms import ModelTerms, list_terms
-from coupled.surveying.whole import Survey, survey_models
 
 
 @public
 def load_rig(rig: str | PathLike[str]) -> Rig:
     """Return the rig of a file, or a shipped one by its name, checked.
 
-    Raises InputError for a name or file that is not there, and for what a rig cannot be,
-    naming file and key.
+    Raises InputError with file and key for an unknown name, a missing file or an invalid rig.
 
     >>> import coupled
     >>> rig = coupled.load_rig("t37")
@@ -36,7 +35,7 @@ def load_rig(rig: str | PathLike[str]) -> Rig:
 
 
 def rig_given(rig: Rig | str | PathLike[str]) -> Rig:
-    """Return a rig given as such, as its file, or as the name of a shipped one."""
+    """Return a rig from a `Rig`, a file, or the name of a shipped rig."""
     return rig if isinstance(rig, Rig) else load_rig(rig)
 
 
@@ -46,7 +45,7 @@ def models(
     workers: int = 0,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> Survey:
-    """Return where JSBSim's models trim or why not, how their controls move, and their rigs.
+    """Return where JSBSim models trim or why not, how their controls move, and their rigs.
 
     `names` are names of models, or folders of others (default: all known models). `workers` is the
     number of processes, 0 for one for each core. Raises InputError for a model that is not found.

@@ -1,4 +1,4 @@
-"""A flight that is stepped from outside, a frame at a time."""
+"""A flight that is advanced frame by frame by the caller."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from typing import Any, Never, Unpack
 
 import numpy as np
 
-from coupled.api.flights import Gradients, Path, Terms, manoeuvre_of, pilots_of
+from coupled.api.flights import FlightKeywords, Gradients, Path, manoeuvre_of, pilots_of
 from coupled.arguments import checks_itself, public
 from coupled.errors import InputError, nearest, shown_value
-from coupled.flight.kept import CachedAircraft, flight_kind, started_aircraft
+from coupled.flight.aircraftcache import CachedAircraft, flight_kind, started_aircraft
 from coupled.flight.loop import make_airframe
 from coupled.flight.manoeuvre import Configuration, Manoeuvre
 from coupled.flight.pilot import Pilot
@@ -28,8 +28,8 @@ from coupled.rig.serving import check_service, set_service
 from coupled.rig.switches import Switches
 from coupled.schema import known_keys
 
-_LONGEST_s = 7200.0  # of a flight, as of a run
-_FIRST_s = 60.0  # length of the arrays at first; to double them takes some 200 steps
+_LONGEST_s = 7200.0  # s, greatest length of a flight, as of a run
+_FIRST_s = 60.0  # s, initial length of the arrays; doubling them takes as long as some 200 steps
 _NAME = "coupled.Session"
 _FORCES = dict.fromkeys(f"{control}_force_N" for control in CONTROL_NAMES)
 _CLOSED = "the session is closed; make a new one"
@@ -37,11 +37,11 @@ _CLOSED = "the session is closed; make a new one"
 
 @public
 class Session:
-    """A flight that is stepped from outside: one frame, and one `State`, for each `step`.
+    """A flight that is advanced by the caller: each `step` flies one frame and returns a `State`.
 
-    Takes what `fly` takes, without a duration. A control without a pilot has the force given to
-    `step`. The record is that of `fly` under the same forces, to the byte. Events, services, wind
-    and gusts act as in a run. Raises InputError as a run file does.
+    Takes the arguments of `fly`, except a duration. `step` takes the forces of the controls without
+    a pilot. The record is identical to that of `fly` with the same forces. Events, services, wind
+    and gusts act as in a run. Raises InputError as for a run file.
 
     >>> import coupled
     >>> with coupled.Session("t37", configuration="uncompensated") as session:
@@ -54,7 +54,7 @@ class Session:
     Record(61 rows, 0.508333 s at 120 Hz; 46 channels: time_s, column_force_N, column_computed_m, …)
     """
 
-    # So that a mistyped switch, as `session.deflection_corection = True`, is refused.
+    # A mistyped switch, as `session.deflection_corection = True`, raises an error.
     __slots__ = (
         *("__weakref__", "_advance", "_again", "_begin", "_begun", "_capacity", "_closed", "_end"),
         *("_ended", "_flight", "_free", "_has_own", "_k", "_kept", "_own", "_places", "_read"),
@@ -70,7 +70,7 @@ class Session:
         pedals: Pilot | Law | None = None,
         gradient: Gradients | None = None,
         configuration: Configuration | None = None,
-        **terms: Unpack[Terms],
+        **terms: Unpack[FlightKeywords],
     ) -> None:
         if "duration_s" in terms:
             raise InputError(_NAME, "duration_s", "a session has none: step it as long as wanted")
@@ -89,7 +89,7 @@ class Session:
         self._start(self._begun)
 
     def _start(self, manoeuvre: Manoeuvre) -> None:
-        """Begin a flight in trim, with the aircraft of the last one if a reset restores it."""
+        """Start a flight in trim, with the aircraft of the last one if a reset restores it."""
         kept, kind, rig = self._kept, flight_kind(manoeuvre), manoeuvre.rig
         if kept is None or kept.kind is None or kept.kind != kind or not kept.restarted():
             kept = started_aircraft(make_airframe(manoeuvre), kind)
@@ -105,22 +105,22 @@ class Session:
         self._k = 0
         self._ended: EndedEarly | None = None
         self._refusal = ""
-        self._continue()
+        self._bind_flight()
         self._begin(0)
-        self._look()
+        self._update_state()
 
-    def _continue(self) -> None:
-        """Take the flight's functions, which are other ones for longer arrays."""
+    def _bind_flight(self) -> None:
+        """Take the functions of the flight, which change when its arrays grow."""
         flight = self._flight
         self._begin, self._end, self._again, advance = flight.frames.steps()
-        # Of a column alone, whose force is given, a step has few calls.
+        # A step with one column whose force is given needs few calls.
         self._advance = advance if self._free and not self._refusal else None
         self._own = flight.forces if self._has_own else None
         self._places, data = flight.places(), flight.data
         self._read = state_reader(self._places, data.data)
 
-    def _look(self) -> None:
-        """Take the state whose host has run."""
+    def _update_state(self) -> None:
+        """Update the state after the host's frame."""
         self._state = State(self._places, self._flight.row(self._k))
 
     def __enter__(self) -> Session:
@@ -139,29 +139,29 @@ class Session:
 
     @property
     def time_s(self) -> float:
-        """The time of the flight, s: the frames flown over the frame rate."""
+        """The time of the flight, s: the number of frames flown over the frame rate."""
         return self._k / self._begun.rig.frame_rate
 
     @property
     def ended_early(self) -> str:
-        """Why and when the flight ended, as at the ground, or an empty string."""
+        """Why and when the flight ended early, as by ground contact, or an empty string."""
         return "" if self._ended is None else str(self._ended)
 
     @property
     def rig(self) -> Rig:
-        """The rig with its present switches."""
+        """The rig with the current switches."""
         return self._switches.rig
 
     @property
     def controls(self) -> tuple[ControlName, ...]:
-        """The controls without a pilot, whose force `step` takes."""
+        """The controls without a pilot, whose forces are arguments of `step`."""
         return tuple(self._free)
 
     @property
     def record(self) -> Record:
         """The record of the frames flown; the state is the row after its last.
 
-        The manifest has, under `session`, switches and services set from outside.
+        Switches and services set from outside are in the manifest, under `session`.
         """
         if self._closed is not None:
             return self._closed
@@ -174,7 +174,7 @@ class Session:
 
     @property
     def deflection_correction(self) -> bool:
-        """Whether the deflection correction is on, on every control; may be set in flight."""
+        """Whether the deflection correction is on, for all controls; can be set in flight."""
         return all(c.compensation.deflection for c in self.rig.controls.values())
 
     @deflection_correction.setter
@@ -183,7 +183,7 @@ class Session:
 
     @property
     def gradient_correction(self) -> bool:
-        """Whether the gradient correction is on, on every control; may be set in flight."""
+        """Whether the gradient correction is on, for all controls; can be set in flight."""
         return all(c.compensation.gradient for c in self.rig.controls.values())
 
     @gradient_correction.setter
@@ -201,15 +201,15 @@ class Session:
     ) -> State:
         """Fly one frame and return the state at its end.
 
-        The forces are held over the frame, up to ±5000 N; a pull, right wheel and right pedal are
-        positive. Without its force a hand is off its grip. When the flight ends early, the state is
+        The forces are constant over the frame, up to ±5000 N; a pull, right wheel and right pedal
+        are positive. The default is no force (hand off). When the flight ends early, the state is
         the last one, and another step raises InputError.
         """
         k, advance = self._k, self._advance
         if (
             advance is None
             or type(column_force_N) is not float
-            or not -5000.0 <= column_force_N <= 5000.0  # STRONGEST; a constant is quicker
+            or not -5000.0 <= column_force_N <= 5000.0  # STRONGEST; a constant is faster
             or k + 1 == self._capacity
             or wheel_force_N is not None
             or pedals_force_N is not None
@@ -229,7 +229,7 @@ class Session:
         return state
 
     def _step(self, given: Sequence[float | None]) -> State:
-        """Fly one frame of any flight, under the forces given to column, wheel and pedals."""
+        """Fly one frame with the given forces of column, wheel and pedals."""
         forces = self._forces(given)
         try:
             self._end(self._k, forces)
@@ -241,14 +241,14 @@ class Session:
         except BaseException:
             self._interrupt()
             raise
-        self._look()
+        self._update_state()
         return self._state
 
     def _interrupt(self) -> None:
         self._refuse(f"was interrupted at {self.time_s:.4g} s; call reset()")
 
     def _forces(self, given: Sequence[float | None]) -> Sequence[float]:
-        """Return the forces of the rig's controls in its order, N, checked."""
+        """Return the forces in the order of the rig's controls, N, checked."""
         if self._refusal:
             raise InputError(_NAME, "step", self._refusal)
         found = [0.0, 0.0, 0.0] if self._own is None else list(self._own(self._k))
@@ -258,7 +258,7 @@ class Session:
         return found
 
     def _number(self, control: ControlName) -> int:
-        """Return the number of a control whose force is given; raises InputError for another."""
+        """Return the index of a control without pilot. Raises InputError for other controls."""
         if control in self._free:
             return self._free[control]
         name, pilots = f"{control}_force_N", self._begun.pilots
@@ -277,21 +277,21 @@ class Session:
             raise InputError(_NAME, "step", f"a flight lasts at most {_LONGEST_s:g} s")
         self._capacity = min(2 * self._capacity, most)
         self._flight.extend(self._capacity)
-        self._continue()
+        self._bind_flight()
 
     def _stop(self, why: str) -> State:
-        """End the flight; the state is that of its last frame."""
+        """End the flight at the state of its last frame."""
         self._ended = EndedEarly(why, self.time_s)
         self._refuse(f"the flight is over: {self._ended}; call reset()")
         return self._state
 
     def reset(self, seed: int | None = None) -> State:
-        """Return to trim, with the rig as it was at first, and return the state there.
+        """Return to trim with the initial rig, and return the state there.
 
-        `seed` is that of the next flight's noise, turbulence and gusts; without it, the session's.
-        A 737, B747, T-37, F-16 or c172p is reset, if nothing but its commands acts on it. Others
-        are loaded anew, without a leak: JSBSim's reset does not restore the position of a kinematic
-        component, as of an awjsra's nozzles.
+        `seed` is for noise, turbulence and gusts of the next flight (default: that of the session).
+        A 737, B747, T-37, F-16 or c172p is reset if only its commands act on it. Others are loaded
+        again, without a memory leak: JSBSim's reset does not restore the position of a kinematic
+        component, as of the nozzles of an awjsra.
         """
         self._check_open("reset")
         self._start(self._begun if seed is None else replace(self._begun, seed=seed))
@@ -301,7 +301,7 @@ class Session:
         """Change a setting of a control from this frame on, as the page of `coupled live` does.
 
         `deflection` and `gradient` are True or False; `assumed_bend` and `bend` are K̂ and K in m/N
-        (rad/N), `friction` and `breakout` in N. Raises InputError as a rig file does.
+        (rad/N), `friction` and `breakout` in N. Raises InputError as for a rig file.
         """
         self._check_flying("set_switch")
         change = partial(self._switches.set, self.time_s, control, switch, value)
@@ -311,19 +311,19 @@ class Session:
         """Set a service of a control's loader from this frame on, as an event of a run does.
 
         Services are those of an event (`jammed`, `trim_m`, `autopilot`, …), in SI. Raises
-        InputError as a run file does.
+        InputError as for a run file.
         """
         self._check_flying("set_service")
         check_service(self.rig, control, service, value, _NAME, "set_service")
         flight, names = self._flight, list(self._begun.rig.controls)
         asked = flight.data[: self._k + 1, self._places[channel(control, "estimate")]]
         flight.served.serve(control, self._capacity, asked)
-        self._continue()
+        self._bind_flight()
         self._services.append((self.time_s, control, service, value))
         self._change(partial(set_service, flight.controls, names, control, service, value))
 
     def close(self) -> None:
-        """End the session; its record, state and time remain."""
+        """End the session; its record, state and time remain available."""
         if self._closed is None:
             self._closed = self.record
             self._refuse(_CLOSED)
@@ -338,10 +338,10 @@ class Session:
             self.set_switch(control, which, bool(on))
 
     def _change(self, change: Callable[[], None]) -> None:
-        """Make a change of the controls at this frame, and take the state with it."""
+        """Apply a change of the controls at this frame, and update the state."""
         copy_row(self._state)
         self._again(self._k, change)
-        self._look()
+        self._update_state()
 
     def _check_open(self, what: str) -> None:
         if self._closed is not None:
@@ -353,7 +353,7 @@ class Session:
 
 
 def _checked_force(name: str, force: Any) -> float:
-    """Return a force of any number's type as a float, N; raises InputError for what is none."""
+    """Return a force of any numeric type as a float, N. Raises InputError for other values."""
     number = isinstance(force, Real) and not isinstance(force, bool)
     if not number or not -STRONGEST <= force <= STRONGEST:
         problem = f"is {shown_value(force)}; give a force from -{STRONGEST:g} to {STRONGEST:g}"

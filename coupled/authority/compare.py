@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from coupled.arguments import public
 from coupled.authority.figures import remarks
-from coupled.authority.held import (
+from coupled.authority.heldcontrol import (
     average_commands,
     average_forces,
     find_held_rows,

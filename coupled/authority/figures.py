@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from itertools import groupby
 from typing import TYPE_CHECKING
 
-from coupled.authority.held import breakaway_force
+from coupled.authority.heldcontrol import breakaway_force
 from coupled.display import Shown, System, drawn, parameter_label, percent, shown
 from coupled.errors import listed
 from coupled.record.channels import SURFACES, unit_of
@@ -145,7 +145,7 @@ def _travel(manoeuvre: Manoeuvre, system: System) -> Shown:
 
 
 def corrects_nothing(flight: Flight) -> bool:
-    """Tell whether a flight's configuration corrects a bend with K̂ = 0, which has no effect."""
+    """Return whether a flight's configuration corrects a bend with K̂ = 0, which has no effect."""
     return _corrects_nothing(flight.manoeuvre)
 
 
@@ -180,7 +180,7 @@ def remarks(flights: Sequence[Flight], system: System = "si") -> list[str]:
 
 
 def guessed(flights: Sequence[Flight]) -> str:
-    """Return which numbers of the control that is looked at are guesses, and what rests on them."""
+    """Return a sentence on the guessed parameters of the compared control, and their effect."""
     manoeuvre = flights[0].manoeuvre
     given = manoeuvre.source.changes if manoeuvre.source is not None else {}
     note = guess_note(manoeuvre.rig.controls, (manoeuvre.control,), given)
@@ -262,7 +262,7 @@ def _resting(cases: Sequence[Sequence[Flight]], system: System) -> Iterator[str]
 
 
 def _raises_breakout(flight: Flight) -> bool:
-    """Tell whether a host adds K̂·G·F_BO to its assumed breakout, eq. (11)."""
+    """Return whether a host adds K̂·G·F_BO to its assumed breakout, eq. (11)."""
     control = flight.manoeuvre.rig.controls[flight.manoeuvre.control]
     host = control.compensation
     return host.gradient and host.bend > 0.0 and control.assumed_breakout > 0.0
@@ -356,17 +356,17 @@ def sweep_remarks(manoeuvre: Manoeuvre, configurations: Sequence[Configuration])
 
 
 def _is_uncorrected(manoeuvre: Manoeuvre) -> bool:
-    """Tell whether a control bends and its host corrects neither gradient nor deflection."""
+    """Return whether a control bends and its host corrects neither gradient nor deflection."""
     host = manoeuvre.rig.controls[manoeuvre.control].compensation
     return _bends(manoeuvre) and (host.bend == 0.0 or not (host.gradient or host.deflection))
 
 
 def holds_force(manoeuvre: Manoeuvre) -> bool:
-    """Tell whether the pilot of the compared control holds a force, not a deflection."""
+    """Return whether the pilot of the compared control holds a force, not a deflection."""
     pilot = manoeuvre.pilots.get(manoeuvre.control)
     return pilot is not None and pilot.kind in _FORCES
 
 
 def moves_surface_alike(bent: Outcome, rigid: Outcome) -> bool:
-    """Tell whether a surface moves about as far as on the rigid rig."""
+    """Return whether a surface moves about as far as on the rigid rig."""
     return abs(bent.reached_norm - rigid.reached_norm) <= _ALIKE * abs(rigid.reached_norm)

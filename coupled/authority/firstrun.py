@@ -1,8 +1,8 @@
-"""A first run for a rig: cases that it flies, written as a commented run file.
+"""A draft run for a rig: cases with a pull, written as a commented run file.
 
-Speeds lie between those at which the aircraft trims and answers. The force moves the control
-a quarter of its travel beyond breakout and friction, or less where that ends a flight early. What
-the run expects is what was flown, rounded away from it.
+The speeds lie between those at which the aircraft trims and responds. The force moves the control a
+quarter of its travel beyond breakout and friction, or less if that ends a flight early. The
+expected values are those of the flights, rounded outward.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from coupled.authority.compare import fly_and_judge
-from coupled.authority.held import breakaway_force
+from coupled.authority.heldcontrol import breakaway_force
 from coupled.authority.outcome import Flight
 from coupled.errors import InputError, collected, shown
 from coupled.flight.manoeuvre import Manoeuvre, PressureProfile
@@ -31,7 +31,7 @@ _DURATION_s, _START_s, _HELD_s = 6.0, 1.0, 3.0
 _SHARE = 0.25  # of the travel, at the gradient that is specified there
 _LEAST = 1.2  # times breakout and friction: a smaller force moves no loader for long
 _DENSITY_kg_per_m3 = 1.225
-_LOST = 0.01  # of the deflection: the most that a good correction leaves
+_LOST = 0.01  # share of the deflection: the largest loss that a correct compensation has
 _SPEED = "flight.calibrated_airspeed_m_per_s"
 
 Progress = Callable[[str, int, int], None]
@@ -39,7 +39,7 @@ Progress = Callable[[str, int, int], None]
 
 @dataclass(frozen=True)
 class _Case:
-    """A case that flies, rigid and compensated; `speed` is 0 on a bench."""
+    """A case whose rigid and compensated flights are complete; `speed` is 0 on a bench."""
 
     label: str
     speed: float
@@ -50,21 +50,21 @@ class _Case:
 def first_run(
     rig: Rig, control: ControlName, word: str, name: str, progress: Progress | None = None
 ) -> str:
-    """Return the text of a run file in which a rig is pulled at speeds of its own.
+    """Return the text of a run file with a pull on a rig, at several speeds.
 
-    `word` is the rig as the run file names it, and `name` the run's name. `progress` is called with
-    what is done, steps done and steps in all. Raises InputError where none of the cases flies.
+    `word` is the rig as the run file names it, and `name` the name of the run. `progress` is called
+    with a label, steps done and steps in all. Raises InputError if no case can be flown.
     """
     data = rig.controls[control]
     if data.drive == "setpoint":
         problem = "a setpoint has no loader that a force moves; write the run by hand"
         raise InputError(rig.place, f"controls.{control}.drive", problem)
     said = progress or (lambda what, done, total: None)
-    tries = _tries(rig, control, said)
+    tries = _candidates(rig, control, said)
     cases, refused = [], list[InputError]()
     for done, (label, speed, pressure) in enumerate(tries):
         said(f"flying {label}", done, len(tries))
-        with collected(refused):  # no trim at this speed, though at one found by steps
+        with collected(refused):  # no trim at this speed, although its neighbours have one
             case = _case(rig, control, label, speed, pressure)
             if case is not None:
                 cases.append(case)
@@ -76,8 +76,8 @@ def first_run(
     return "\n".join([*_head(rig, control, word, name, cases), *_expectations(control, cases), ""])
 
 
-def _tries(rig: Rig, control: ControlName, said: Progress) -> list[tuple[str, float, float]]:
-    """Return what to try: label, calibrated airspeed, q̄ in Pa; on a bench its schedule's ends."""
+def _candidates(rig: Rig, control: ControlName, said: Progress) -> list[tuple[str, float, float]]:
+    """Return candidates: label, calibrated airspeed, q̄ in Pa; on a bench the schedule's ends."""
     if rig.flight is None:
         pressures = rig.controls[control].schedule.dynamic_pressure
         return [(f"{pressures[-1] / 1000.0:.3g} kPa", 0.0, pressures[-1])]
@@ -94,7 +94,7 @@ def _tries(rig: Rig, control: ControlName, said: Progress) -> list[tuple[str, fl
 def _case(
     rig: Rig, control: ControlName, label: str, speed: float, pressure_Pa: float
 ) -> _Case | None:
-    """Return a case with the greatest force that flies, or nothing."""
+    """Return a case with the greatest force that can be flown, or None."""
     data = rig.controls[control]
     least = _LEAST * (data.loader.breakout + breakaway_force(data.loader))
     travel = _SHARE * data.travel
@@ -160,7 +160,7 @@ def _head(
 
 
 def _expectations(control: ControlName, cases: Sequence[_Case]) -> list[str]:
-    """Return what a check insists on: the loss compensated, and the motion of the rigid rig."""
+    """Return the expectations: the loss when compensated, and the motion of the rigid rig."""
     lost = [abs(case.flights[1].outcome.loss) for case in cases]
     lines = []
     if all(map(math.isfinite, lost)):

@@ -40,7 +40,7 @@ Progress = Callable[[str, int, int], None]
 FELT: tuple[Configuration, ...] = ("rigid", "uncompensated", "compensated")
 _SEA_LEVEL_kg_per_m3 = 1.225
 _LEAST_PRESSURE_Pa = 200.0
-_CONSTANT_Pa = 1000.0  # the map's q̄ where a gradient is the same at any
+_CONSTANT_Pa = 1000.0  # q̄ of the map if the gradient does not depend on it
 _PRESSURES, _DEFLECTIONS, _SPEEDS = 33, 65, 9
 _STEPS, _BEYOND_STOP = 401, 17  # along δc, and along δ beyond the loader's stop
 _STEP, _PULL_s = 0.01, 3.0  # size of the elevator command, in the linear range, and its duration
@@ -76,7 +76,7 @@ class Feel:
     per_knot_N: dict[Configuration, Floats]
 
     def to_polars(self) -> pl.DataFrame:
-        """Return a row for each speed, in SI; null where there is no force."""
+        """Return one row per speed, in SI; null for a missing force."""
         columns = {
             "calibrated_airspeed_m_per_s": self.calibrated_airspeed_m_per_s,
             "dynamic_pressure_Pa": self.pressure_Pa,

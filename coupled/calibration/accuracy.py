@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coupled.calibration.assumed import Scales
+from coupled.calibration.assumedscales import Scales
 from coupled.calibration.errors_in_variables import JointFit
 from coupled.calibration.estimate import Estimate, total
 from coupled.rig.equations import bend_loss, felt_gradient, modifying_gradient
@@ -51,15 +51,15 @@ def deflection_off(found: Scales, bend: float, true: Scales, true_bend: float, g
     return seen + bend_loss(bend, g) * true.s3 / found.s3 - 1.0
 
 
-def made_of_asked(found: Scales, true: Scales) -> float:
+def actual_over_ordered(found: Scales, true: Scales) -> float:
     """Return ΔF over the ΔF ordered, by scales assumed and true: figures 3 and 5."""
     return true.s1 / found.s1 * found.s2 / true.s2
 
 
 def felt_off(made: float, bend: float, true_bend: float, gradients: tuple[float, float]) -> float:
-    """Return felt over specified gradient less 1.
+    """Return felt over specified gradient minus 1.
 
-    `made` is ΔF over the ΔF ordered (`made_of_asked`), `gradients` (G, G_B) in N/d.
+    `made` is ΔF over the ΔF ordered (`actual_over_ordered`), `gradients` (G, G_B) in N/d.
     """
     g, basic = gradients
     held = basic + modifying_gradient(g, bend, basic) * made

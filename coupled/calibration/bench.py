@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from coupled.calibration.assumed import real_scales
+from coupled.calibration.assumedscales import real_scales
 from coupled.calibration.estimate import Instruments
 from coupled.calibration.plan import FULL_TRAVEL, STRONGEST_N, Station
 from coupled.calibration.readings import Readings, readings_of
@@ -187,7 +187,7 @@ def _null(rig: Rig, bench: CalibrationBench, rng: np.random.Generator) -> Floats
     # From rest each time, and slowly, like the supply: then friction is the same in both.
     held = np.hstack(
         [
-            _hold(plain, bench, force, _by_way_of(force, side, allowance), np.zeros(1), rng, SLOW_s)
+            _hold(plain, bench, force, _peaks(force, side, allowance), np.zeros(1), rng, SLOW_s)
             for force, side in zip(forces[:, None], sides, strict=True)
         ]
     )
@@ -198,14 +198,14 @@ def _null(rig: Rig, bench: CalibrationBench, rng: np.random.Generator) -> Floats
 
     def shown(v2: float, side: float) -> float:
         supply = np.array(v2 / scales.s2)
-        rest = rests_at(float(_by_way_of(supply, side, allowance)), float(supply))
+        rest = rests_at(float(_peaks(supply, side, allowance)), float(supply))
         return float(_reading(np.array(scales.s1 * rest), tools.meter, tools.meter_step, rng))
 
     # A loader held by friction or breakout shows 0 V: there is nothing to restore.
     least = tools.meter + tools.meter_step
     moved = v1 > least
     v2 = [
-        _turn_until(partial(shown, side=side), wanted, tools)
+        _adjust_supply(partial(shown, side=side), wanted, tools)
         for side, wanted in zip(sides[moved], v1[moved], strict=True)
     ]
     # The supply's setting is read as well.
@@ -214,7 +214,7 @@ def _null(rig: Rig, bench: CalibrationBench, rng: np.random.Generator) -> Floats
     return found[:, (np.abs(found[1:3]) > least).all(axis=0)]
 
 
-def _by_way_of(force: Floats, side: float, allowance: float) -> Floats:
+def _peaks(force: Floats, side: float, allowance: float) -> Floats:
     """Return the peak force, N, before a force that is approached from a side.
 
     The way is as long outward as inward, so that the hand varies for the same time on both.
@@ -250,7 +250,7 @@ def _without_multiplier(rig: Rig, control: ControlName) -> Rig:
     )
 
 
-def _turn_until(shown: Callable[[float], float], wanted: float, tools: Instruments) -> float:
+def _adjust_supply(shown: Callable[[float], float], wanted: float, tools: Instruments) -> float:
     """Return the supply's voltage at which the meter shows v₁ as wanted, as a person finds it.
 
     The voltage is raised beyond the target, then interpolated between two settings, or bisected if

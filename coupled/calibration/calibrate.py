@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from coupled.arguments import public
 from coupled.calibration import arc, scales
 from coupled.calibration.accuracy import expected
-from coupled.calibration.assumed import stale
+from coupled.calibration.assumedscales import stale
 from coupled.calibration.errors_in_variables import errors_in_variables
 from coupled.calibration.estimate import Instruments, usual_instruments
 from coupled.calibration.fit import condition, normal_equations, ordinary
+from coupled.calibration.readingchecks import find_unit_doubts, refuse_poor
 from coupled.calibration.readings import Readings
 from coupled.calibration.readingsfile import read_readings
-from coupled.calibration.refuse import find_unit_doubts, refuse_poor
 from coupled.calibration.result import CalibrationResult
 from coupled.calibration.suspects import find_suspects
 from coupled.errors import InputError, nearest

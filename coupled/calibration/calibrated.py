@@ -19,11 +19,11 @@ from coupled.arguments import public
 from coupled.calibration.accuracy import (
     DEFLECTION_WITHIN,
     FELT_WITHIN,
+    actual_over_ordered,
     deflection_off,
     felt_off,
-    made_of_asked,
 )
-from coupled.calibration.assumed import GAINS, assumed_scales, real_scales
+from coupled.calibration.assumedscales import GAINS, assumed_scales, real_scales
 from coupled.calibration.estimate import Estimate
 from coupled.calibration.result import CalibrationResult
 from coupled.errors import InputError, nearest
@@ -123,7 +123,7 @@ def _in_volts(found: CalibrationResult) -> dict[str, Estimate | None]:
 
 
 def _is_filed(control: Control, name: str, found: Estimate | None) -> bool:
-    """Tell whether the rig file states a scale, or the readings are of its own bench.
+    """Return whether the rig file states a scale, or the readings are of its own bench.
 
     The bench of a rig that states none uses the converters' full scale.
     """
@@ -156,7 +156,7 @@ def refuse_other_hardware(
     host, true, true_bend = assumed_scales(new), real_scales(new), new.loader.bend
     off = deflection_off(host, bend, true, true_bend, g)
     gradients = (g, new.loader.basic_gradient)
-    felt = felt_off(made_of_asked(host, true), bend, true_bend, gradients)
+    felt = felt_off(actual_over_ordered(host, true), bend, true_bend, gradients)
     if promise.felt is None or abs(felt) <= max(_BEYOND * promise.felt.half_width, FELT_WITHIN):
         felt = 0.0
     if abs(off) <= max(_BEYOND * promise.deflection.half_width, DEFLECTION_WITHIN):
@@ -175,7 +175,7 @@ def refuse_other_hardware(
 
 
 def _contradictions(filed: Control, found: CalibrationResult) -> str:
-    """Return the values in which readings and file differ most, as words."""
+    """Return a phrase on the values in which readings and file differ most."""
     d, real, sensing = unit_of(found.control), real_scales(filed), filed.sensing
     figures = [("K", found.line.bend, filed.loader.bend, f"{d}/N")]
     if sensing.s1:

@@ -55,7 +55,7 @@ class ControlCheck:
 
     @property
     def margin(self) -> float:
-        """Share of the tolerance left."""
+        """The share of the tolerance that remains."""
         return 1.0 - abs(self.measured - self.reference) / self.tolerance
 
     @property
@@ -165,11 +165,11 @@ def surface_checks(
     surface: str = "",
     read: Sequence[SweepLeg] = (),
 ) -> list[ControlCheck]:
-    """Return the surface's position where it differs most from the deflection's, both ways.
+    """Return the surface positions with the largest deviations from those of the deflection.
 
     `surface_rad` is the surface's travel for full travel of the control. `surface` is the surface's
-    name if it is not the control's own, such as a spoiler moved by the wheel. On legs `read` on
-    the aircraft, the reference is the aircraft's position.
+    name if it is not the control's own, such as a spoiler moved by the wheel. On legs `read` on the
+    aircraft, the reference is the aircraft's position.
     """
     found = []
     allowed = SURFACE_rad[surface or data.surface] / DEGREE_rad
@@ -207,10 +207,10 @@ class Swing:
     fall_s: float
 
 
-def swing_of(let_go: Release) -> Swing:
+def swing_of(release: Release) -> Swing:
     """Return a release's crossings, peaks and fall."""
-    rest, time = _resting(let_go), let_go.time_s
-    share = (let_go.deflection - rest) / (let_go.start - rest)
+    rest, time = _rest_position(release), release.time_s
+    share = (release.deflection - rest) / (release.start - rest)
     begin = _falls_to(time, share, 0.9)
     end = _falls_to(time, share, 0.1)
     change = np.flatnonzero(share[:-1] * share[1:] < 0.0)
@@ -222,10 +222,10 @@ def swing_of(let_go: Release) -> Swing:
     return Swing(begin, crossings - begin, peaks[peaks > COUNTED], end - begin)
 
 
-def _resting(let_go: Release) -> float:
+def _rest_position(release: Release) -> float:
     """Return the position at which friction holds a release at its end, d; neutral if it moves."""
-    tail = let_go.deflection[-max(len(let_go.deflection) // 10, 1) :]
-    rest, moves, start = float(tail[-1]), float(np.ptp(tail)), abs(let_go.start)
+    tail = release.deflection[-max(len(release.deflection) // 10, 1) :]
+    rest, moves, start = float(tail[-1]), float(np.ptp(tail)), abs(release.start)
     held = moves <= STILL * start and RESTING * moves <= abs(rest) < STUCK * start
     return rest if held else 0.0
 

@@ -11,11 +11,11 @@ import numpy as np
 from coupled.calibration.accuracy import (
     DEFLECTION_WITHIN,
     FELT_WITHIN,
+    actual_over_ordered,
     deflection_off,
     felt_off,
-    made_of_asked,
 )
-from coupled.calibration.assumed import Scales, real_scales
+from coupled.calibration.assumedscales import Scales, real_scales
 from coupled.calibration.bench import CalibrationBench, take_readings
 from coupled.calibration.calibrate import calibrate_control
 from coupled.calibration.result import CalibrationResult
@@ -145,18 +145,18 @@ def _trial(bench: CalibrationBench, seed: int) -> Trial:
         plain.value / bend - 1.0,
         plain.holds(bend),
         bool(found.suspects),
-        *_most_off(found, data),
+        *_largest_errors(found, data),
     )
 
 
-def _most_off(found: CalibrationResult, data: Control) -> tuple[float, float]:
+def _largest_errors(found: CalibrationResult, data: Control) -> tuple[float, float]:
     """Return the largest relative errors of δ̂ and of the felt gradient."""
     true, bend = real_scales(data), data.loader.bend
     k, s2 = found.line.bend.value, found.s2_chosen
     assumed = Scales(found.line.s1.value, true.s2 if s2 is None else s2.value, found.fit.s3.value)
     table, basic = data.schedule.gradients, data.loader.basic_gradient
     gradients = [float(g) for g in np.linspace(min(table), max(table), 3)]
-    made = made_of_asked(assumed, true)
+    made = actual_over_ordered(assumed, true)
     return (
         max(abs(deflection_off(assumed, k, true, bend, g)) for g in gradients),
         max(abs(felt_off(made, k, bend, (g, basic))) for g in gradients),

@@ -16,7 +16,7 @@ from coupled.calibration.checks import (
 )
 from coupled.calibration.specification import SweepLeg, specified_legs, specified_rig
 from coupled.calibration.sweeps import Release, feel_pressures, release, sweep
-from coupled.flight.direct import check_direct_controls
+from coupled.flight.directcontrols import check_direct_controls
 from coupled.flight.manoeuvre import configure
 from coupled.record.channels import CONTROL_NAMES, ControlName
 from coupled.resources import aircraft_folder
@@ -29,7 +29,7 @@ SIDES = {"positive": 1.0, "negative": -1.0}
 
 
 @dataclass(frozen=True)
-class LetGo:
+class ReleasePair:
     """A release of the rig as filed, and of the specified rig."""
 
     felt: Release
@@ -40,7 +40,7 @@ class LetGo:
 class FeelCondition:
     """One q̄: the specification, and sweeps without and with compensation and of the rig as filed.
 
-    `let_go` are the releases by side.
+    `releases` are the releases by side.
     """
 
     pressure_Pa: float
@@ -48,7 +48,7 @@ class FeelCondition:
     uncompensated: History
     compensated: History
     felt: History
-    let_go: Mapping[str, LetGo]
+    releases: Mapping[str, ReleasePair]
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ def document(
             sweep(configure(rig, "uncompensated"), control, pressure),
             sweep(configure(rig, "compensated"), control, pressure),
             sweep(rig, control, pressure),
-            _let_go(rig, control, pressure, specified),
+            _release_pairs(rig, control, pressure, specified),
         )
         conditions.append(condition)
         checks += _checks(condition, control, specified.controls[control], surface_rad)
@@ -118,8 +118,8 @@ def check_feel(
     checks = []
     for pressure, legs_there in _legs_by_pressure(specified, control, aircraft).items():
         felt = sweep(rig, control, pressure)
-        let_go = _let_go(rig, control, pressure, specified)
-        condition = FeelCondition(pressure, legs_there, felt, felt, felt, let_go)
+        pair = _release_pairs(rig, control, pressure, specified)
+        condition = FeelCondition(pressure, legs_there, felt, felt, felt, pair)
         checks += _checks(condition, control, specified.controls[control], surface_rad)
     return tuple(checks)
 
@@ -136,9 +136,11 @@ def _legs_by_pressure(
     }
 
 
-def _let_go(rig: Rig, control: ControlName, pressure: float, specified: Rig) -> Mapping[str, LetGo]:
+def _release_pairs(
+    rig: Rig, control: ControlName, pressure: float, specified: Rig
+) -> Mapping[str, ReleasePair]:
     return {
-        name: LetGo(
+        name: ReleasePair(
             release(rig, control, pressure, side), release(specified, control, pressure, side)
         )
         for name, side in SIDES.items()
@@ -152,8 +154,8 @@ def _checks(
     checks = static_checks(data, control, pressure, felt, condition.specified)
     if surface_rad is not None:
         checks += surface_checks(data, surface_rad, pressure, felt, read=condition.specified)
-    for side, let_go in condition.let_go.items():
-        checks += dynamic_checks(pressure, side, let_go.felt, let_go.specified)
+    for side, pair in condition.releases.items():
+        checks += dynamic_checks(pressure, side, pair.felt, pair.specified)
     return checks
 
 

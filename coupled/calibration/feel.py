@@ -289,7 +289,7 @@ class _Fit:
         self._remove()
 
     def _determined(self, nodes: Sequence[float]) -> bool:
-        """Tell whether each segment holds a deflection, and each at neutral two, at every q̄.
+        """Return whether each segment has a deflection, and each at neutral two, at every q̄.
 
         From two deflections a straight line is extended to neutral, where it gives the breakout.
         """

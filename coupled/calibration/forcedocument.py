@@ -1,4 +1,4 @@
-"""The force document of a rig, whole: each control's documentation, its fit, and which issue."""
+"""The force document of a rig: the documentation and fit of each control, and the issue."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ Fits = Mapping[ControlName, tuple[CalibrationResult, str] | None]
 
 @dataclass(frozen=True, repr=False)
 class ForceDocument(TableResult):
-    """A rig's forces, documented: a `Documentation` a control, with the fit of its readings."""
+    """The force document of a rig: a `Documentation` per control, with the fit of its readings."""
 
     rig: Rig
     controls: tuple[Documentation, ...]
@@ -55,11 +55,11 @@ class ForceDocument(TableResult):
         return f"ForceDocument({self.rig.name}: {within} of {len(checks)} checks within tolerance)"
 
     def as_dict(self) -> dict[str, list[dict[str, Any]]]:
-        """Return each control's checks as JSON takes them."""
+        """Return the checks of each control as JSON data."""
         return {found.control: [c.as_dict() for c in found.checks] for found in self.controls}
 
     def to_polars(self) -> pl.DataFrame:
-        """Return the checks, a row each, with units."""
+        """Return the checks, one row each, with units."""
         table = self.as_dict()
         return frame_of([{"control": name} | row for name, rows in table.items() for row in rows])
 
@@ -74,11 +74,11 @@ def document_rig(
     revision: str = "",
     progress: Progress | None = None,
 ) -> ForceDocument:
-    """Return a rig's force document, of one control or of all.
+    """Return the force document of a rig, for one control or all.
 
-    `readings` are of the first control (a virtual bench's unless given), `specified` is a rig that
-    says what is specified, `aircraft` the aircraft's own forces. Raises InputError where the rig
-    lacks the control, or a file cannot be used.
+    `readings` are of the first control (default: a virtual bench), `specified` is a rig with the
+    specified values, `aircraft` measured forces of the aircraft. Raises InputError if the rig does
+    not have the control, or a file cannot be used.
     """
     file = Path(rig.place)
     rig.check_controlled(file)
@@ -107,12 +107,12 @@ def document_rig(
 
 
 def _issue(rig: Rig, reference: str, date: str, revision: str) -> Issue:
-    """Return what the cover says: of the rig as it is, which may differ from its file."""
+    """Return the data of the cover, for the current rig, which may differ from its file."""
     text, file = rig.to_toml(), rig.file
     digest = hashlib.sha256(text.encode()).hexdigest()
     name = shown(file.name) if file is not None else f"{rig.name}.toml"
     if file is not None and file.is_file():
-        if file.read_text(encoding="utf-8-sig") == text:  # whatever its line ends
+        if file.read_text(encoding="utf-8-sig") == text:  # line ends may differ
             digest = sha256(file)
         else:
             name += ", changed"
@@ -122,9 +122,9 @@ def _issue(rig: Rig, reference: str, date: str, revision: str) -> Issue:
 def _fit(
     rig: Rig, control: ControlName, readings: Path | None, chosen: Sequence[ControlName]
 ) -> tuple[CalibrationResult, str] | None:
-    """Return the fit to draw of a control, and where its readings are from.
+    """Return the fit of a control for its figure, and the source of its readings.
 
-    None for a control of one gradient, and for all but the first where readings are given.
+    None for a control of one gradient, and if readings are given for all but the first.
     """
     data, tools = rig.controls[control], usual_instruments(control)
     if readings is not None:

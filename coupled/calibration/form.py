@@ -1,4 +1,4 @@
-"""A plan of readings as a form to be filled in at the bench."""
+"""A plan of readings as a CSV form."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ def form(
     crossed: Mapping[ControlName, Sequence[float]] | None = None,
     system: System = "si",
 ) -> str:
-    """Return a plan as a CSV to be filled in: what to hold, and empty cells.
+    """Return a plan as a CSV form: the forces and deflections to set, and empty cells.
 
-    `crossed` is what to hold on other controls, N, by reading. A form in `us` takes inches (degrees
-    of a wheel) and pounds.
+    `crossed` are the forces on other controls, N, by reading. With `us` the units are inches
+    (degrees for a wheel) and pounds.
     """
     others = dict(crossed or {})
     moved, force, pressure = (in_system(unit, system) for unit in (unit_of(control), "N", "Pa"))
@@ -49,10 +49,10 @@ _STARTING_LOADS = (0.25, 0.5, 0.75, 1.0)  # of the largest pull, in each gradien
 
 
 def starting_form(control: str, inches: bool = False) -> str:
-    """Return a form for an unknown loader, as a CSV with empty cells.
+    """Return a CSV form with empty cells for an unknown loader.
 
-    Two gradient sets, each pulled at four loads, and four nulls from both sides (eq. 14). A
-    wheel's deflection is in degrees; otherwise it is in mm and newtons, or inches and pounds.
+    Two gradient sets, each pulled at four loads, and four nulls from both sides (eq. 14). A wheel's
+    deflection is in degrees; otherwise it is in mm and newtons, or inches and pounds.
     """
     unit = "deg" if control == "wheel" else "in" if inches else "mm"
     force = "lb" if inches else "N"

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from coupled.calibration.accuracy import DEFLECTION_WITHIN
-from coupled.calibration.assumed import real_scales
+from coupled.calibration.assumedscales import real_scales
 from coupled.calibration.errors_in_variables import expected_design
 from coupled.calibration.estimate import Estimate, Instruments
 from coupled.calibration.readings import readings_of
@@ -103,7 +103,7 @@ def stations(
 
 
 def _reach(rig: Rig, control: ControlName, pressure: float, strongest_N: float) -> float:
-    """Return how far a control can be held with this force, d."""
+    """Return the largest deflection at which this force can hold a control, d."""
     full = FULL_TRAVEL * rig.controls[control].travel
 
     def excess(deflection: float) -> float:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 COLUMNS = ("deflection", "force_N", "v1_V", "v3_V")
 Signal = Literal["V", "counts"]
-_WHOLE = ("label", "other_names", "gauge", "signal")  # fields that are no column of numbers
+_WHOLE = ("label", "other_names", "gauge", "signal")  # fields that are no columns of numbers
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class Readings(TableResult):
         return f"Readings({len(self.row)} readings in {sets} gradient sets, {nulls} nulls)"
 
     def to_polars(self) -> pl.DataFrame:
-        """Return a row a reading: deflection in m, or rad on a wheel, force in N, voltages in V."""
+        """Return one row per reading: deflection in m, or rad for a wheel, force in N, signals."""
         columns = (self.deflection, self.force, self.v1, self.v3)
         return frame_of(
             [

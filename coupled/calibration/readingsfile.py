@@ -285,7 +285,7 @@ def units_of(path: Path, heads: list[str], control: str) -> dict[str, tuple[str,
 
 
 def _voltages(path: Path, heads: list[str]) -> dict[str, tuple[str, float]]:
-    """Return {quantity: (column, 1)} of v1, and of v2 and v3 where they are there."""
+    """Return {quantity: (column, 1)} of v1, and of v2 and v3 if present."""
     signal = signal_of(path, heads)
     there = {name: f"{name}_{signal}" for name in ("v1", "v3", "v2")}
     if there["v2"] in heads and there["v3"] not in heads:
@@ -318,7 +318,7 @@ def _crossed(
 
 
 def after(column: str) -> str:
-    """Return the column of a second look, after the voltmeter's."""
+    """Return the column of a second reading, after the voltmeter's."""
     return column.replace("_", "_after_", 1)
 
 

@@ -30,9 +30,9 @@ def reasons(
     if not failed:
         return []
     control, d = rig.controls[name], unit_of(name)
-    sentences = _of_the_host(control, in_system(f"{d}/N", system))
+    sentences = _host_errors(control, in_system(f"{d}/N", system))
     if control.loader.bend > 0.0:
-        sentences += _of_the_bend(control, failed, in_system("N", system))
+        sentences += _bend_effects(control, failed, in_system("N", system))
     if not sentences:
         sentences = [
             "The rig file does not show the reason. docs/calibration.md has a table of faults by"
@@ -41,7 +41,7 @@ def reasons(
     return sentences
 
 
-def _of_the_host(control: Control, bent: Shown) -> list[str]:
+def _host_errors(control: Control, bent: Shown) -> list[str]:
     """Return what the host corrects wrongly or not at all."""
     host, bend, sensing = control.compensation, control.loader.bend, control.sensing
     found = []
@@ -68,7 +68,7 @@ def _of_the_host(control: Control, bent: Shown) -> list[str]:
     return found
 
 
-def _of_the_bend(control: Control, failed: Sequence[ControlCheck], force: Shown) -> list[str]:
+def _bend_effects(control: Control, failed: Sequence[ControlCheck], force: Shown) -> list[str]:
     """Return effects of a bent structure that eq. (12) does not correct."""
     found = []
     timed = any(not check.name.startswith((*_FORCE, _SURFACE)) for check in failed)

@@ -61,7 +61,7 @@ class CalibrationResult(Result):
 
     @property
     def s3(self) -> Estimate | None:
-        """S₃ in V/N with errors in all variables; None where v₃ was not read."""
+        """S₃ in V/N with errors in all variables; None if v₃ was not read."""
         return self.fit.s3 if self.readings.gauge else None
 
     @property

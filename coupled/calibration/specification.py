@@ -2,10 +2,10 @@
 
 Static: the force of `specified_force` at each deflection, plus friction along the motion. Dynamic:
 a release of the specified rig. The specified rig is the rig that the host assumes, rigid, with true
-scales and without faults: the schedule's table as filed, the host's G_B and breakout, and the
-filed mass, damping, friction and servo, for which there is no other value. Faults of the latter
-show only against another rig, or (static) against forces of the aircraft, which are the reference
-if given (`aircraftdata`).
+scales and without faults: the schedule's table as filed, the host's G_B and breakout, and the filed
+mass, damping, friction and servo, for which there is no other value. Faults of these four are
+visible only with another rig as reference, or (static) with forces of the aircraft, which are the
+reference if given (`aircraftdata`).
 """
 
 from __future__ import annotations

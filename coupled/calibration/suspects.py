@@ -42,10 +42,10 @@ def find_suspects(readings: Readings, instruments: Instruments) -> list[Suspect]
     """Return the readings whose deviation exceeds the instruments' errors."""
     suspects = []
     if len(readings.row) >= FEWEST:
-        line = _off_the_line(readings, instruments)
+        line = _line_deviations(readings, instruments)
         ratio = np.zeros(len(readings.row))
         if readings.gauge:
-            ratio = _off_the_ratio(
+            ratio = _ratio_deviations(
                 readings.v3,
                 readings.force,
                 instruments.voltage_variance(readings.v3),
@@ -58,7 +58,7 @@ def find_suspects(readings: Readings, instruments: Instruments) -> list[Suspect]
                 suspects.append(Suspect(int(row), where, float(max(one, two))))
     if len(readings.null_row) >= FEWEST:
         volts = instruments.voltage_variance
-        off = _off_the_ratio(
+        off = _ratio_deviations(
             readings.null_v2,
             readings.null_v3,
             volts(readings.null_v2),
@@ -77,7 +77,7 @@ def robust_line(columns: Sequence[Floats], v1: Floats, spread: Floats) -> Floats
     """
     design = np.column_stack(columns) / spread[:, None]
     target = v1 / spread
-    beta, scale = _most_agreed(design, target)
+    beta, scale = _best_pair(design, target)
     for _ in range(50):
         residual = target - design @ beta
         weight = np.maximum(1.0 - (residual / (BIWEIGHT * scale)) ** 2, 0.0)
@@ -90,7 +90,7 @@ def robust_line(columns: Sequence[Floats], v1: Floats, spread: Floats) -> Floats
     return beta
 
 
-def _most_agreed(design: Floats, target: Floats) -> tuple[Floats, float]:
+def _best_pair(design: Floats, target: Floats) -> tuple[Floats, float]:
     """Return the line through two readings with which most others agree, and the residuals' scale.
 
     The two readings must have different gradients: two of one gradient fit all readings of that
@@ -135,7 +135,7 @@ def _scale(residual: Floats) -> float:
     return float(NORMAL * (1.0 + 5.0 / (n - 2)) * np.median(np.abs(residual)) + 1e-300)
 
 
-def _off_the_line(readings: Readings, instruments: Instruments) -> Floats:
+def _line_deviations(readings: Readings, instruments: Instruments) -> Floats:
     """Return the deviation of each v₁ from the robust line, in standard deviations."""
     columns = (readings.deflection, readings.force, *readings.others.T)
     v = readings.v1
@@ -146,7 +146,7 @@ def _off_the_line(readings: Readings, instruments: Instruments) -> Floats:
     return _deviations((v - sum(x * one for x, one in zip(found, columns, strict=True))) / spread)
 
 
-def _off_the_ratio(
+def _ratio_deviations(
     top: Floats, bottom: Floats, top_variance: Floats, bottom_variance: Floats
 ) -> Floats:
     """Return the deviation of each `top` from the median ratio times `bottom`, likewise."""

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.authority.held import breakaway_force
+from coupled.authority.heldcontrol import breakaway_force
 from coupled.calibration.plan import gradient_sets
 from coupled.errors import InputError
 from coupled.record.channels import ControlName

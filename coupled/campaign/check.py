@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from coupled.arguments import public
 from coupled.authority.compare import Flight, compare
 from coupled.campaign.latency import fly_undelayed
-from coupled.campaign.verdict import Verdict, in_full, judge_expectation
+from coupled.campaign.verdict import Verdict, judge_expectation, verdict_text
 from coupled.errors import InputError
 from coupled.flight.expectation import LATENCIES, Expect, UnjudgedError
 from coupled.flight.manoeuvre import Configuration, Manoeuvre
@@ -60,7 +60,7 @@ class CheckResult(TableResult):
     def __repr__(self) -> str:
         failed = [verdict for verdict in self.verdicts if not verdict.passed]
         head = f"{self.total - len(failed)} of {self.total} expectations hold"
-        return "\n".join([head, *(in_full(verdict) for verdict in failed)])
+        return "\n".join([head, *(verdict_text(verdict) for verdict in failed)])
 
     def require(self) -> CheckResult:
         """Return this result; raise AssertionError with its text where an expectation fails."""
@@ -124,11 +124,11 @@ def check_run(scenarios: Sequence[Manoeuvre], progress: Progress | None = None) 
     flights = compare([_needed(scenario) for scenario in scenarios], progress)
     flown: Flown = {(f.outcome.case, f.configuration): f for f in flights}
     undelayed = {where: fly_undelayed(f.manoeuvre) for where, f in flown.items() if _timed(f)}
-    return [_verdict(*asked, flown, undelayed) for asked in asked_of(scenarios)]
+    return [_verdict(*asked, flown, undelayed) for asked in expectations_of(scenarios)]
 
 
-def asked_of(scenarios: Sequence[Manoeuvre]) -> list[Asked]:
-    """Return what is expected of a run, an item a verdict, in the order of the verdicts."""
+def expectations_of(scenarios: Sequence[Manoeuvre]) -> list[Asked]:
+    """Return the expectations of a run, one item per verdict, in the order of the verdicts."""
     return [
         Asked(expect, scenario, configuration)
         for scenario in scenarios
@@ -152,7 +152,7 @@ def _needed(scenario: Manoeuvre) -> Manoeuvre:
 
 
 def _timed(flight: Flight) -> bool:
-    """Tell whether a flight is compared with the same flight without delays."""
+    """Return whether a flight is compared with the same flight without delays."""
     asked = [e for e in flight.manoeuvre.expect if e.standard in LATENCIES]
     ended = bool(flight.ended_early)
     return not ended and any(e.concerns(flight.outcome.case, flight.configuration) for e in asked)

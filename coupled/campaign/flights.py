@@ -24,7 +24,7 @@ from coupled.campaign.journal import Journal
 from coupled.campaign.plan import PlannedFlight, SweepPlan, extreme_names, planned_flights
 from coupled.campaign.sweepfile import Survive
 from coupled.errors import InputError
-from coupled.flight.kept import AircraftCache
+from coupled.flight.aircraftcache import AircraftCache
 from coupled.flight.loop import fly
 from coupled.parallel import as_done
 from coupled.record.record import Record

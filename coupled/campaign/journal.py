@@ -21,7 +21,7 @@ from coupled.files import clear, read_bytes
 
 JOURNAL = "flights.jsonl"
 LOCK = ".lock"
-UNFINISHED = ".coupled-"  # prefix of a file in `files` until it is complete
+UNFINISHED = ".coupled-"  # prefix of an incomplete file in `files`
 
 
 ANOTHER = "holds another sweep, or what this one reads has changed since; give a new folder"

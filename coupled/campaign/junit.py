@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from itertools import groupby
 from xml.etree import ElementTree
 
-from coupled.campaign.verdict import Verdict, finding
+from coupled.campaign.verdict import Verdict, verdict_line
 
 _NO_XML = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
@@ -24,9 +24,9 @@ def junit_xml(verdicts: Sequence[Verdict]) -> str:
             case = _element(suite, "testcase", classname=place, name=name)
             if not verdict.passed:
                 kind = "error" if verdict.problem else "failure"
-                _element(case, kind, message=finding(verdict))
+                _element(case, kind, message=verdict_line(verdict))
             else:
-                _element(case, "system-out").text = finding(verdict)
+                _element(case, "system-out").text = verdict_line(verdict)
     ElementTree.indent(root)
     text = ElementTree.tostring(root, encoding="unicode")
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'

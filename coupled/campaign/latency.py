@@ -33,7 +33,7 @@ Floats = NDArray[np.float64]
 UNDELAYED = "with nothing late"  # configuration name of the reference
 REFERENCE_Hz = 2000.0
 FRAMES_LATE = 1.5  # of a host and JSBSim; subtracted from the reference
-BEGUN = 0.05  # of the largest rate
+RESPONSE_SHARE = 0.05  # of the largest rate
 WITHIN_s = 1.0  # of the beginning, in which the largest rate is searched
 _ROUNDS = 100  # at most; a response of two parts takes some ten
 _SETTLED_s = 1e-6
@@ -88,11 +88,11 @@ def latency_s(control: ControlName, flight: Flight, reference: Flight) -> float:
     Raises UnjudgedError if the flight is not a valid test.
     """
     _check_flight(control, flight.manoeuvre)
-    begun_s = _begins(reference.record, control)
-    own = _answer(reference.record, control, begun_s)
+    begun_s = _command_start(reference.record, control)
+    own = _response_start(reference.record, control, begun_s)
     late = 0.0
     for _ in range(_ROUNDS):  # the second with the largest rate is delayed as well
-        before, late = late, _answer(flight.record, control, begun_s + late) - own
+        before, late = late, _response_start(flight.record, control, begun_s + late) - own
         if abs(late - before) <= _SETTLED_s:
             break
     return late + FRAMES_LATE / REFERENCE_Hz
@@ -108,8 +108,8 @@ def _check_flight(control: ControlName, manoeuvre: Manoeuvre) -> None:
         raise UnjudgedError("latency is measured in still air and without events")
 
 
-def _begins(record: Record, control: ControlName) -> float:
-    """Return the time at which the hand's force begins, s."""
+def _command_start(record: Record, control: ControlName) -> float:
+    """Return the start time of the pilot's force, s."""
     force = record[channel(control, "hand_force")]
     moved = np.flatnonzero(force != force[0])
     if not moved.size:
@@ -117,10 +117,10 @@ def _begins(record: Record, control: ControlName) -> float:
     return float(record.time_s[max(int(moved[0]) - 1, 0)])
 
 
-def _answer(record: Record, control: ControlName, begun_s: float) -> float:
-    """Return the time at which the rate that a control causes has begun, s.
+def _response_start(record: Record, control: ControlName, begun_s: float) -> float:
+    """Return the start time of the response in the rate that a control causes, s.
 
-    It is the last time before the largest rate at which the rate was below `BEGUN` of it,
+    It is the last time before the largest rate at which the rate was below `RESPONSE_SHARE` of it,
     interpolated between rows, so that noise does not count.
     """
     time_s, rate = record.time_s, record[RATE[control]]
@@ -129,7 +129,7 @@ def _answer(record: Record, control: ControlName, begun_s: float) -> float:
     turned = np.abs(rate - np.interp(begun_s, time_s, rate))
     looked_at = (time_s >= begun_s) & (time_s <= begun_s + WITHIN_s)
     peak = int(np.argmax(np.where(looked_at, turned, -1.0)))
-    level = BEGUN * turned[peak]
+    level = RESPONSE_SHARE * turned[peak]
     under = np.flatnonzero(turned[:peak] < level)
     if not under.size:
         raise UnjudgedError(f"the aircraft does not turn on the {control}")

@@ -189,7 +189,7 @@ def _check_keys(
                 if value is values[0] and any(table in vary.key for table in _OF_MODEL):
                     _check_name(scenario, vary.key)
             except InputError as error:
-                faults.append(_blamed(vary, i, value, error, file, try_changes))
+                faults.append(_named_error(vary, i, value, error, file, try_changes))
                 break
             files |= set(input_files(scenario))
     if faults:
@@ -197,7 +197,7 @@ def _check_keys(
     return files
 
 
-def _blamed(
+def _named_error(
     vary: Vary,
     index: int,
     value: Any,

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from coupled.authority.compare import Flight
-from coupled.authority.held import average_held_forces
+from coupled.authority.heldcontrol import average_held_forces
 from coupled.campaign.latency import latency_s
 from coupled.campaign.tolerances import (
     LONG_TERM_N,

@@ -64,7 +64,7 @@ def read_sections(given: Mapping[str, Any], file: Path) -> SweepFile:
 
 
 def _sections(given: Mapping[str, Any], file: Path) -> SweepFile:
-    """Return a sweep file's tables, each value by itself as it should be."""
+    """Return the tables of a sweep file, with each value checked separately."""
     table, faults = dict(given), list[InputError]()
     with collected(faults):
         known_keys(table, file_keys(SweepFile, "m"), file, "")
@@ -88,13 +88,13 @@ def _sections(given: Mapping[str, Any], file: Path) -> SweepFile:
     with collected(faults):
         sweep = build(SweepFile, known, file, "")
     if faults or sweep is None:
-        there = [key for key in kinds if key in given]  # but with faults of their own
+        there = [key for key in kinds if key in given]  # but with errors of their own
         raise together([f for f in faults if f.problem != MISSING or f.key not in there])
     return sweep
 
 
 def _faults(sweep: SweepFile, file: Path) -> Iterator[InputError]:
-    """Yield what of a sweep's values does not go together."""
+    """Yield the errors of combinations of keys."""
     keys: list[Any] = [key for vary in sweep.vary for key in (vary.key, *vary.also)]
     lists: dict[str, list[Any]] = {"vary": keys, "keep": sweep.keep, "extremes": sweep.extremes}
     lists["configurations"] = sweep.configurations
@@ -129,13 +129,13 @@ def _size_faults(sweep: SweepFile, file: Path, countable: bool) -> Iterator[Inpu
 
 
 def flight_count(sweep: SweepFile) -> int:
-    """Return how many flights a sweep has."""
+    """Return the number of flights of a sweep."""
     flights = (sweep.samples or grid_size(sweep)) * max(1, len(sweep.configurations))
     return flights * (len(sweep.vary) + 2) if sweep.method == "sensitivity" else flights
 
 
 def grid_size(sweep: SweepFile) -> int:
-    """Return how many points a grid has."""
+    """Return the number of points of a grid."""
     size = 1
     for vary in sweep.vary:
         size *= vary.steps or len(vary.values or ())

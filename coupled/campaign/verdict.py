@@ -85,7 +85,7 @@ def figures(verdict: Verdict, system: System = "si") -> tuple[str, str]:
     return found, margin
 
 
-def finding(verdict: Verdict, system: System = "si") -> str:
+def verdict_line(verdict: Verdict, system: System = "si") -> str:
     """Return the result in one line."""
     bounds = f" (wanted {wanted(verdict, system)})" if wanted(verdict) else ""
     if verdict.value is None or verdict.margin is None:
@@ -94,7 +94,7 @@ def finding(verdict: Verdict, system: System = "si") -> str:
     return f"{found}{bounds}, margin {margin}"
 
 
-def in_full(verdict: Verdict, system: System = "si") -> str:
+def verdict_text(verdict: Verdict, system: System = "si") -> str:
     """Return a verdict for people, in lines: measured, expected, margin, time, and why."""
     found, margin = figures(verdict, system)
     head = f"{verdict.run}, {verdict.case} [{verdict.configuration}]: {verdict.what}"
@@ -141,7 +141,7 @@ def _figure(expect: Expect, flight: Flight, other: Flight | None) -> StandardFig
     elif expect.reaches is not None:
         value = at_s = _time_reached(expect, flight)
     else:
-        value, at_s = _taken(expect, flight, other)
+        value, at_s = _channel_value(expect, flight, other)
     return StandardFigure(value, *expect.bounds, at_s=at_s)
 
 
@@ -166,7 +166,9 @@ def _refuse_early(flight: Flight, end_s: float) -> None:
         raise UnjudgedError(f"the flight ended early: {flight.outcome.ended_early}")
 
 
-def _taken(expect: Expect, flight: Flight, other: Flight | None) -> tuple[float, float | None]:
+def _channel_value(
+    expect: Expect, flight: Flight, other: Flight | None
+) -> tuple[float, float | None]:
     """Return the figure of a channel and its time; of all rows, the one closest to its bound.
 
     A mean has no time.

@@ -94,7 +94,7 @@ def bench(
 ) -> None:
     """Simulate calibration readings of a rig by ruler, spring scale and voltmeter."""
     from coupled.calibration.bench import CalibrationBench, take_readings
-    from coupled.calibration.crossed import crossed_forces
+    from coupled.calibration.crossforces import crossed_forces
     from coupled.calibration.estimate import perfect_instruments
     from coupled.calibration.plan import fewest, stations
     from coupled.calibration.readingsfile import write_readings

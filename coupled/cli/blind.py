@@ -82,7 +82,7 @@ def make(
             )
     except KeyboardInterrupt:
         if folder.is_dir():
-            say(f"what is made is kept in {folder}: the same command goes on")
+            say(f"finished records are kept in {folder}: the same command continues")
         raise
     if made.before:
         say(f"{folder} is finished already, by these numbers: nothing was made")

@@ -39,7 +39,7 @@ from coupled.record.channels import ControlName, unit_of
 if TYPE_CHECKING:
     from coupled.calibration.estimate import Instruments
     from coupled.calibration.plan import DeflectionNeeds
-    from coupled.calibration.planned import ReadingsPlan
+    from coupled.calibration.readingsplan import ReadingsPlan
     from coupled.calibration.result import CalibrationResult
     from coupled.rig.rig import Rig
 
@@ -214,7 +214,7 @@ def _plan(
     targets: tuple[Path | None, str],
     units: System,
 ) -> None:
-    from coupled.calibration.planned import plan_readings
+    from coupled.calibration.readingsplan import plan_readings
 
     (file, rig, control), (write, json_file) = of_rig, targets
     share, strongest, looks, crossed = wanted
@@ -242,7 +242,7 @@ def _plan(
 
 
 def _print_results(found: CalibrationResult, system: System) -> None:
-    """Print the results of readings, how far to trust them, and which to use."""
+    """Print the results of readings, their reliability, and the values to use."""
     from coupled.calibration.figures import basis, remarks
     from coupled.cli.tables import print_table
     from coupled.tables.calibration import results_table
@@ -256,7 +256,7 @@ def _print_results(found: CalibrationResult, system: System) -> None:
 
 
 def _print_plan(plan: ReadingsPlan, system: System) -> None:
-    """Print how precise K gets by grids of readings, and the fewest that reach what is wanted."""
+    """Print the precision of K with grids of readings, and the fewest readings that suffice."""
     from coupled.cli.tables import print_table
     from coupled.display import percent
     from coupled.tables.calibration import grids_table, plan_table

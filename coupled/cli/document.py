@@ -107,7 +107,7 @@ def document(
     say_doubts(data)
     text = ""
     if write is not None:
-        data, text = _remedied(data, chosen, file, write, [*inputs, pdf])
+        data, text = _with_release_schedule(data, chosen, file, write, [*inputs, pdf])
     only = chosen[0] if control else None
     with progress() as advance:
         found = document_rig(
@@ -163,11 +163,11 @@ def _print(documents: Sequence[Documentation], every: bool, judged: bool, units:
         out.print("no aircraft: the surface's position is not judged\n")
 
 
-def _remedied(
+def _with_release_schedule(
     rig: Rig, chosen: list[ControlName], file: Path, target: Path, inputs: list[Path]
 ) -> tuple[Rig, str]:
     """Return the rig whose compensated releases are as specified, and its text."""
-    from coupled.calibration.letgo import scheduled
+    from coupled.calibration.releaseschedule import schedule_for_release
     from coupled.rig.rigfile import rig_from_table
     from coupled.rig.rigwrite import rig_text
     from coupled.schema import loads_toml
@@ -181,7 +181,7 @@ def _remedied(
         problem = "is false; only releases with the gradient correction need --write"
         raise InputError(file, key, problem)
     for name in bent:
-        rig = scheduled(rig, name)
+        rig = schedule_for_release(rig, name)
     remark = f"{shown(file.name)}, mass, damping and a lead by the gradient on {', '.join(bent)}"
     text = rig_text(rig, remark)
     rig_from_table(loads_toml(text, target), target)  # a rig that cannot be flown is refused

@@ -1,4 +1,4 @@
-"""Writing and printing what `new feel` and `import --feel` find in a sweep of a control."""
+"""Writing and printing the results of `new feel` and `import --feel` for a sweep of a control."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def keep_feel(
     outputs: Outputs,
     units: System = "si",
 ) -> None:
-    """Write the keys of a rig file to `file`, and the plot to check them by beside it."""
+    """Write the keys of a rig file to `file`, and a plot of the fit with the same name."""
     from coupled.calibration.feel import feel_text
     from coupled.plots.feel import draw_sweep
     from coupled.plots.saving import save
@@ -35,7 +35,7 @@ def keep_feel(
 
 
 def print_feel(feel: Feel, control: ControlName, file: Path, units: System = "si") -> None:
-    """Print what was found, the files, and the next step."""
+    """Print the results, the files, and the next step."""
     newtons = in_system("N", units)
     for what, value, half in (
         ("breakout", feel.breakout_N, feel.breakout_half_width_N),

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from coupled.cli.app import JsonOption, WideOption, app
-from coupled.cli.held import RECORDS, check_rig_target, files_read, read_each
 from coupled.cli.progress import progress
+from coupled.cli.recordfiles import RECORDS, check_rig_target, files_read, read_each
 from coupled.cli.rigs import ControlOption, say_guesses
 from coupled.cli.terminal import check_json, keep_json, out, print_json, say
 from coupled.errors import shown

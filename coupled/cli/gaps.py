@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from coupled.cli.app import JsonOption, UnitsOption, WideOption, app, check_cluster
-from coupled.cli.held import RECORDS, check_rig_target, files_read, read_each
 from coupled.cli.progress import progress
+from coupled.cli.recordfiles import RECORDS, check_rig_target, files_read, read_each
 from coupled.cli.reporting import ReportOption, check_report, say_report, write_report
 from coupled.cli.rigs import say_guesses
 from coupled.cli.terminal import check_json, keep_json, out, print_json, say
@@ -204,7 +204,7 @@ def _diagnose(
 def _print(
     whole: Diagnosis, power: bool, written: tuple[Path | None, list[Path]], units: System
 ) -> None:
-    from coupled.calibration.assumed import outdated_bends
+    from coupled.calibration.assumedscales import outdated_bends
     from coupled.cli.tables import print_table
     from coupled.tables.gaps import diagnosis_tables
 
@@ -250,7 +250,7 @@ def _write_improved(
     records: dict[str, Record],
     with_curves: bool,
 ) -> None:
-    from coupled.calibration.assumed import outdated_bends
+    from coupled.calibration.assumedscales import outdated_bends
     from coupled.files import read_text
     from coupled.gap.checks import rig_of_manifests, trim_in
     from coupled.gap.findings.summary import changed

@@ -151,7 +151,7 @@ def _convert(
 
 
 def _felt(record: Record, log: Path) -> tuple[ControlName, Feel]:
-    """Return the control that a log sweeps, and what is felt there."""
+    """Return the control that a log sweeps, and its feel."""
     from coupled.calibration.feel import fit_feel, sweep_of_record, swept_control
 
     control = swept_control(record, log)
@@ -194,7 +194,7 @@ def _print_account(account: ImportAccount) -> None:
 
 
 def _print_proposal(proposal: Proposal) -> None:
-    """Print which column a proposed map takes for which channel, and what it asks."""
+    """Print the column of each channel in a proposed map, and the open questions."""
     from coupled.cli.tables import print_table
     from coupled.tables.logs import proposal_table
 

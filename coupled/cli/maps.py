@@ -43,7 +43,7 @@ def draw_map(
     units: UnitsOption = "si",
 ) -> None:
     """Map a rig's lost authority over q̄ and deflection, and stick force per g and per knot."""
-    from coupled.authority.whole import map_rig
+    from coupled.authority.authoritymap import map_rig
     from coupled.plots.maps import draw_feel, draw_losses
     from coupled.plots.saving import check_format, save
     from coupled.record.csvfile import write_table

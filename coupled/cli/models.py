@@ -1,4 +1,4 @@
-"""The commands `models` and `new rig`: JSBSim's models, and first rigs for them."""
+"""The commands `models`, `terms` and `new rig`: JSBSim's models, and draft rigs for them."""
 
 from __future__ import annotations
 
@@ -50,8 +50,8 @@ def models(
     json_file: JsonOption = "",
 ) -> None:
     """List JSBSim models: where each trims or why not, how its controls move, its rigs."""
+    from coupled.surveying.modelsurvey import survey_models
     from coupled.surveying.survey import chosen_models
-    from coupled.surveying.whole import survey_models
 
     chosen_models(names or ())
     check_json(json_file, [])
@@ -280,7 +280,7 @@ def _print_found(found: LogNumbers, control: ControlName, units: System) -> None
 
 
 def _for_model(model: str, file: Path | None, airframe_only: bool) -> None:
-    """Write a first rig for a JSBSim model: where it trims, found; its loader, guessed."""
+    """Write a draft rig for a JSBSim model, with computed trim and assumed loader."""
     from coupled.rig.parameters import plain_name
     from coupled.surveying.draft import draft
     from coupled.surveying.survey import chosen_model, surveyed

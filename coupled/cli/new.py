@@ -133,7 +133,7 @@ def _run_for(rig: str, control: str, file: Path) -> str:
 
 
 def check_new(file: Path, suffix: str) -> None:
-    """Raise InputError for another ending than `suffix`, and where a file is there already."""
+    """Raise InputError unless the name ends in `suffix`, and if the file exists."""
     if file.suffix.lower() != suffix:
         raise InputError(file, "", f"give a name that ends in {suffix}")
     check_target(file)
@@ -144,7 +144,7 @@ def check_new(file: Path, suffix: str) -> None:
 def write_new(file: Path, text: str, suffix: str, then: str) -> None:
     """Write a template as a new file, and print the next command.
 
-    Raises InputError for another ending than `suffix`, and where a file is there already.
+    Raises InputError unless the name ends in `suffix`, and if the file exists.
     """
     check_new(file, suffix)
     write_text(file, text)
@@ -157,5 +157,5 @@ def _text(name: str) -> str:
 
 
 def word_of(file: Path) -> str:
-    """Return the file as a command takes it."""
+    """Return the file as an argument of a command."""
     return shlex.quote(str(file))

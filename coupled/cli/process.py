@@ -29,15 +29,15 @@ class Stop:
     def __init__(self) -> None:
         self.exit_code, self.received = 0, False
         wanted = [getattr(signal, name, None) for name in ("SIGTERM", "SIGHUP")]
-        # A signal that is ignored, as by nohup, stays ignored.
+        # An ignored signal, as with nohup, stays ignored.
         self._signals = [n for n in wanted if n and signal.getsignal(n) == signal.SIG_DFL]
 
     def __enter__(self) -> Stop:
         for number in self._signals:
-            signal.signal(number, self._come)
+            signal.signal(number, self._handle_signal)
         self._before = signal.getsignal(signal.SIGINT)
         if self._before == signal.default_int_handler:
-            signal.signal(signal.SIGINT, self._come)
+            signal.signal(signal.SIGINT, self._handle_signal)
         return self
 
     def __exit__(self, *error: object) -> None:
@@ -45,9 +45,9 @@ class Stop:
             signal.signal(number, signal.SIG_DFL)
         signal.signal(signal.SIGINT, self._before)
 
-    def _come(self, number: int, frame: FrameType | None) -> None:
+    def _handle_signal(self, number: int, frame: FrameType | None) -> None:
         self.received = True
-        if number != signal.SIGINT:  # the command itself decides how it then ends
+        if number != signal.SIGINT:  # the command decides how it ends
             self.exit_code = 128 + number
         raise KeyboardInterrupt
 
@@ -61,9 +61,9 @@ def was_interrupted() -> bool:
 def prepare_streams() -> None:
     """Make the standard streams safe to use.
 
-    A closed one is opened on nothing, or the next file would take its number and whatever a
-    library prints would go into it. A letter that the terminal's encoding lacks is shown as a
-    question mark: a table in which one is missing is better than a flight lost.
+    A closed stream is opened on the null device, or the next file would take its number and receive
+    the prints of libraries. A character that the terminal's encoding lacks is shown as a question
+    mark instead of an error.
     """
     for number in (0, 1, 2):
         try:
@@ -78,15 +78,15 @@ def prepare_streams() -> None:
 def prepare_threads() -> None:
     """Let linear algebra use one thread, unless the user sets another number.
 
-    The matrices here are small, and its threads would wait for one another longer than they work;
-    what takes long is dealt to processes. Only before numpy is loaded has this an effect.
+    The matrices are small, and its threads would mostly wait for one another; long work is
+    distributed to processes. This has an effect only before numpy is loaded.
     """
     for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")
 
 
 def prepare_warnings() -> None:
-    """Print warnings of libraries as one line, without the place in their code."""
+    """Print warnings of libraries as one line, without the code location."""
     warnings.showwarning = say_warning
 
 

@@ -19,15 +19,15 @@ MARK = "…"  # before each line, so that a log can be filtered
 
 @contextmanager
 def progress(first: str = "") -> Iterator[Advance]:
-    """Show the progress of what is done within, on the error side.
+    """Show the progress of this context on standard error.
 
-    What is given is called with what goes on, how much of it is done, and how much there is.
-    `first` is said until then; by default that the command is starting.
+    The yielded function is called with a label, the amount done and the total. `first` is the label
+    until then; by default that the command is starting.
     """
     with _bar(first or _starting()) if err.is_terminal else _lines(first) as show:
 
         def advance(label: str, done: int, total: int) -> None:
-            if was_interrupted():  # a library may swallow it, and the work continue
+            if was_interrupted():  # a library may suppress it and the work continue
                 raise KeyboardInterrupt
             show(label, done, total)
 

@@ -17,7 +17,7 @@ from coupled.files import check_target, write_text
 from coupled.outputs import Outputs
 
 if TYPE_CHECKING:
-    from coupled.reports.page import Made, Report
+    from coupled.reports.page import Provenance, Report
 
 ReportOption = Annotated[
     Path | None,
@@ -46,18 +46,18 @@ def write_report(
     path: Path,
     outputs: Outputs,
     inputs: Iterable[Path],
-    report: Callable[[Made], Report],
+    report: Callable[[Provenance], Report],
     note: str = "",
 ) -> None:
     """Write a command's report with its other files; `inputs` are the files that it read.
 
     The `note` is a sentence below its verdict.
     """
-    from coupled.reports.made import made_by
     from coupled.reports.page import render
+    from coupled.reports.provenance import provenance_of
 
     command = shlex.join(["coupled", *map(printable, sys.argv[1:])])
-    made = report(made_by(command, inputs))
+    made = report(provenance_of(command, inputs))
     if note:
         verdict = replace(made.verdict, remarks=(*made.verdict.remarks, note))
         made = replace(made, verdict=verdict)

@@ -93,7 +93,7 @@ def say_guesses(rig: Rig, controls: Collection[str] = ()) -> str:
 
 def say_stale(rig: Rig) -> None:
     """Print on standard error what has changed since a rig's calibrations, and doubtful q̄."""
-    from coupled.calibration.assumed import stale
+    from coupled.calibration.assumedscales import stale
     from coupled.rig.bounds import pressure_doubts
 
     for name, control in rig.controls.items():

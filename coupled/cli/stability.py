@@ -45,7 +45,7 @@ def stability(
     hand, the servo frequency, and the bandwidth and mass of the gauge.
     """
     from coupled.authority.stability.planes import kinds_of
-    from coupled.authority.stability.whole import compliant_controls, map_stability
+    from coupled.authority.stability.stabilitymap import compliant_controls, map_stability
     from coupled.cli.tables import print_table
     from coupled.plots.saving import check_format, save
     from coupled.plots.stability import draw_stability

@@ -1,4 +1,4 @@
-"""Tables on a terminal, none of them cut: where it is too narrow, each row is written downwards."""
+"""Tables on a terminal without cut columns: in a narrow one, each row is printed as lines."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ _COLORS = {"good": "green", "bad": "red", "plain": "default"}
 
 
 def print_table(console: Console, table: Table, edge: bool = False, gap: int = 2) -> None:
-    """Print a table below its caption; where its columns do not fit, a line for each cell.
+    """Print a table below its caption; if its columns do not fit, one line per cell.
 
-    Where it fits without some of its spare columns, those are left out and named: --wide shows
-    them. In lines, a cell without a head, as a unit or a verdict, stands behind the one before it.
-    `edge` is whether a space stands before each line, `gap` the number of spaces between columns.
+    If it fits without some of its spare columns, these are omitted and named: --wide shows them. In
+    lines, a cell without a heading, as a unit or a verdict, follows the cell before it. `edge` puts
+    a space before each line, `gap` is the number of spaces between columns.
     """
     if table.caption:
         console.print(escape(table.caption), style="bold", highlight=False)
@@ -41,7 +41,7 @@ def print_table(console: Console, table: Table, edge: bool = False, gap: int = 2
 
 
 def broken_heads(table: Table) -> Table:
-    """Return a table whose long heads are on lines of their own, a remark in () on the last."""
+    """Return a table whose long headings are on several lines, a remark in () on the last."""
     return replace(table, heads=tuple(map(_broken, table.heads)))
 
 
@@ -91,7 +91,7 @@ def _laid_out(table: Table, edge: bool, gap: int) -> rich.table.Table:
 
 
 def _width(table: Table, gap: int) -> int:
-    """Return the columns of a terminal that a table needs for its words and numbers whole."""
+    """Return the terminal width that a table needs without breaking words and numbers."""
     width = gap * (len(table.heads) - 1)
     for i, (head, cells) in enumerate(zip(table.heads, _columns(table), strict=True)):
         texts = [head, *(Text.from_markup(cell).plain for cell in cells)]
@@ -102,11 +102,11 @@ def _width(table: Table, gap: int) -> int:
 
 
 def _print_lines(console: Console, table: Table) -> None:
-    """Print a line for each cell, below the row's name."""
+    """Print one line per cell, below the name of the row."""
     first, *heads = [" ".join(head.split()).replace("- ", "") for head in table.heads]
     for row in zip(*_columns(table), strict=True):
         name, *cells = (Text.from_markup(cell) for cell in row)
-        if first and not table.has_words(0):  # a number, which has no meaning alone
+        if first and not table.has_words(0):  # a number has no meaning alone
             name = Text(f"{first}: ") + name
         if name.plain:
             console.print(name, style="bold")

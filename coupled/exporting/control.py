@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from coupled.exporting.controlexport import ControlExport, add_clock, stepping
 from coupled.exporting.expression import Expr, Value, either, equal, prop, sine, within
 from coupled.exporting.host import (
     BENCH_PRESSURE,
@@ -16,7 +17,6 @@ from coupled.exporting.host import (
 )
 from coupled.exporting.linkage import Grip, add_hand, add_servo, add_weights, begin, deflection
 from coupled.exporting.loader import Motion, add_loader, held
-from coupled.exporting.making import Made, add_clock, stepping
 from coupled.exporting.surface import add_surface
 from coupled.exporting.system import System
 from coupled.record.channels import CONTROL_NAMES, ControlName
@@ -31,7 +31,7 @@ _CONVERTERS = ("computed", "force", "product", "gradient")
 
 def control_system(rig: Rig, name: ControlName, substeps: int) -> System:
     """Return the system of one control, whose loader takes `substeps` steps in a run of JSBSim."""
-    made = Made(rig, name, substeps)
+    made = ControlExport(rig, name, substeps)
     add_clock(made)
     _add_inputs(made)
     add_weights(made)
@@ -47,13 +47,13 @@ def control_system(rig: Rig, name: ControlName, substeps: int) -> System:
     return made.system
 
 
-def clamp_gains(made: Made, gradient: float) -> tuple[float, float, float]:
+def clamp_gains(made: ControlExport, gradient: float) -> tuple[float, float, float]:
     """Return stiffness, damping and integral of a hand that holds the grip at a position."""
     loader, w = made.control.loader, HAND_rad_per_s
     return w * loader.damping, w * loader.mass, w * gradient
 
 
-def _add_inputs(made: Made) -> None:
+def _add_inputs(made: ControlExport) -> None:
     """Add the inputs: a force, or a position that a hand holds; and the switches."""
     system, d, host = made.system, made.d, made.control.compensation
     travel, own = made.control.travel, made.own
@@ -110,7 +110,7 @@ def _add_inputs(made: Made) -> None:
         system.add(f"hand/{gain}-now", own("hand") * own(f"hand-{gain}-{unit}"))
 
 
-def _add_motion(made: Made) -> None:
+def _add_motion(made: ControlExport) -> None:
     """Add hand, loader and linkage over the run's time, substep by substep."""
     system, d, own = made.system, made.d, made.own
     says = f"hand, loader and linkage, {made.substeps} substeps of h"
@@ -139,12 +139,12 @@ def _add_motion(made: Made) -> None:
     _give(made, now, grip, lagged)
 
 
-def _leads(made: Made) -> bool:
+def _leads(made: ControlExport) -> bool:
     host = made.control.compensation
     return host.inertia_gradient is not None and host.force_lead is not None
 
 
-def _led(made: Made, i: int, after: Expr, lagged: Expr) -> tuple[Expr, Expr, Expr]:
+def _led(made: ControlExport, i: int, after: Expr, lagged: Expr) -> tuple[Expr, Expr, Expr]:
     """Return the force with the host's lead at both ends of substep i, and z, N."""
     lag, h, own = made.control.compensation.force_lead_lag, made.own("step-s"), made.own
     now = made.system.add(f"step-{i}/lead", lagged + h / (h + lag) * (after - lagged))
@@ -152,7 +152,7 @@ def _led(made: Made, i: int, after: Expr, lagged: Expr) -> tuple[Expr, Expr, Exp
     return made.kept("led-N") if i == 1 else own(f"step-{i - 1}/led"), ahead, now
 
 
-def _delayed(made: Made, start: Expr) -> list[Expr] | None:
+def _delayed(made: ControlExport, start: Expr) -> list[Expr] | None:
     """Return the force at each node of the run behind a transport delay, N; None without one.
 
     It is linear between the ends of runs.
@@ -181,7 +181,7 @@ def _delayed(made: Made, start: Expr) -> list[Expr] | None:
     return found
 
 
-def _give(made: Made, now: Motion, grip: Grip, lagged: Expr | None) -> None:
+def _give(made: ControlExport, now: Motion, grip: Grip, lagged: Expr | None) -> None:
     """Add the results of the run: positions of loader and grip, for the next run and as output."""
     system, d, add = made.system, made.d, made.system.add
     system.channel("linkage", "δ = x + K·F, and the state for the next run")
@@ -210,7 +210,7 @@ def _give(made: Made, now: Motion, grip: Grip, lagged: Expr | None) -> None:
     add(f"deflection-{d}", true, out=f"δ at the grip, {d}")
 
 
-def _crossed(made: Made, *, assumed: bool) -> Expr | None:
+def _crossed(made: ControlExport, *, assumed: bool) -> Expr | None:
     """Return the bend here by the other controls' forces, true or as assumed by the host, d."""
     if made.rig.structure.stands_apart:
         return None
@@ -225,7 +225,7 @@ def _crossed(made: Made, *, assumed: bool) -> Expr | None:
     return found
 
 
-def _converters(made: Made) -> dict[str, tuple[float, float]]:
+def _converters(made: ControlExport) -> dict[str, tuple[float, float]]:
     """Return step and range of each converter, computed by `rig/sensing`."""
     rig = made.rig
     frame_s = 1.0 / rig.frame_rate

@@ -21,8 +21,8 @@ from typing import Any
 
 import numpy as np
 
+from coupled.exporting.controlexport import ControlExport
 from coupled.exporting.expression import Expr, either, greater, less, looked_up, most, size, within
-from coupled.exporting.making import Made
 from coupled.rig.equations import felt_gradient, total_to_computed
 from coupled.rig.parameters import Schedule
 
@@ -38,7 +38,7 @@ def sloped(schedule: Schedule, table: list[float]) -> list[float]:
     return [rest + schedule.slope * (value - rest) for value in table]
 
 
-def add_curve(made: Made, scale: float, sent: Callable[[Expr], Expr]) -> None:
+def add_curve(made: ControlExport, scale: float, sent: Callable[[Expr], Expr]) -> None:
     """Add the curve's nodes at the schedule's q̄, F_extra, and G_T of the segment.
 
     `scale` is the factor on ΔG; `sent` is a gradient after the host's converter.
@@ -61,26 +61,26 @@ def add_curve(made: Made, scale: float, sent: Callable[[Expr], Expr]) -> None:
             ended = add(f"{place}/computed", far - bend * (preload + reached))
             passed = most(begun, 0.0) if last else within(0.0, begun, ended)
             at_neutral = at_neutral + total * (passed - begun)
-            made.once_a_frame(
+            made.add_at_frame(
                 f"{place}/slope", sent(scale * (total - control.assumed_basic_gradient))
             )
-            made.once_a_frame(f"{place}/from", most(begun, 0.0) / multiplied)
+            made.add_at_frame(f"{place}/from", most(begun, 0.0) / multiplied)
             force, begun = reached, ended
         neutral[side] = at_neutral
     if preload > 0.0:
         up, down = neutral["pull"], neutral.get("push", neutral["pull"])
         made_force = 1.0 / sensing.modifying_scale
         more = made_force * (0.5 * (up + down) - preload)
-        made.once_a_frame("host/extra", more, "F_extra, which appendix C leaves out")
-        made.once_a_frame("host/extra-offset", made_force * 0.5 * (up - down))
+        made.add_at_frame("host/extra", more, "F_extra, which appendix C leaves out")
+        made.add_at_frame("host/extra-offset", made_force * 0.5 * (up - down))
     read = sensing.read_scale * made.own(f"loader-{made.d}")
     on_computed: Any = curve_slope(made, read / multiplied) / scale + control.assumed_basic_gradient
     says = f"G_T, the gradient of the curve at δc, N/{made.d}"
     felt: Any = felt_gradient(on_computed, bend)
-    made.once_a_frame(f"gradient-N_per_{made.d}", felt, out=says)
+    made.add_at_frame(f"gradient-N_per_{made.d}", felt, out=says)
 
 
-def curve_force(made: Made, at: Expr) -> Expr:
+def curve_force(made: ControlExport, at: Expr) -> Expr:
     """Return F_mod at δc = `at`, N, without F_extra."""
     pull = _along(made, "pull", at)
     if "push" in _sides(made.control.schedule):
@@ -93,7 +93,7 @@ def curve_force(made: Made, at: Expr) -> Expr:
     return force
 
 
-def curve_slope(made: Made, at: Expr) -> Expr:
+def curve_slope(made: ControlExport, at: Expr) -> Expr:
     """Return dF_mod/dδc at δc = `at`, N/d."""
     slopes = []
     for side, nodes in _sides(made.control.schedule).items():
@@ -105,7 +105,7 @@ def curve_slope(made: Made, at: Expr) -> Expr:
     return either(greater(0.0, at), slopes[-1], slopes[0])
 
 
-def _along(made: Made, side: str, way: Expr) -> Expr:
+def _along(made: ControlExport, side: str, way: Expr) -> Expr:
     """Return the size of F_mod at δc = `way` outward on a side, 0 on the other."""
     segments = len(_sides(made.control.schedule)[side]) - 1
     force: Any = 0.0

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from coupled.errors import InputError
-from coupled.exporting.befalling import unknown_condition
+from coupled.exporting.conditions import unknown_condition
 from coupled.exporting.model import Files
 from coupled.exporting.write import Export, Flown
 from coupled.files import check_target
@@ -22,7 +22,7 @@ MARK = "coupled-export.json"  # identifies a folder of an export, which may be o
 
 
 def check_folder(folder: Path) -> None:
-    """Raise InputError for a folder that cannot be written, or has files of no export."""
+    """Raise InputError for a folder that cannot be written, or has other files than an export."""
     if folder.is_file():
         raise InputError(folder, "", "is a file; name a folder")
     if folder.is_dir() and any(folder.iterdir()) and not (folder / MARK).is_file():

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from coupled.exporting.controlexport import ControlExport
 from coupled.exporting.expression import (
     Expr,
     cosine,
@@ -19,7 +20,6 @@ from coupled.exporting.expression import (
     within,
 )
 from coupled.exporting.loader import Motion
-from coupled.exporting.making import Made
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Grip:
     carried: Expr | None = None  # the force behind the bend's play, N
 
 
-def add_weights(made: Made) -> None:
+def add_weights(made: ControlExport) -> None:
     """Add the servo's weights for a δc linear over a substep (`servo_weights`)."""
     loader, system, h = made.control.loader, made.system, made.own("step-s")
     if loader.servo_frequency == 0.0:
@@ -61,7 +61,7 @@ def add_weights(made: Made) -> None:
     system.add("servo/v-by-before", -1.0 * back - after)
 
 
-def add_servo(made: Made, place: str, was: Motion, now: Motion, grip: Grip) -> Grip:
+def add_servo(made: ControlExport, place: str, was: Motion, now: Motion, grip: Grip) -> Grip:
     """Add one substep of servo and backlash; the hand's part is unchanged."""
     system, loader, own = made.system, made.control.loader, made.own
     x, v = grip.position, grip.rate
@@ -87,7 +87,7 @@ def add_servo(made: Made, place: str, was: Motion, now: Motion, grip: Grip) -> G
     return Grip(moved, moving, at, grip.force, grip.integral, grip.carried)
 
 
-def bend(made: Made, force: Expr) -> Expr:
+def bend(made: ControlExport, force: Expr) -> Expr:
     """Return the structure's bend under a force, d, with its switch."""
     loader = made.control.loader
     limit = loader.bend_limit
@@ -98,13 +98,13 @@ def bend(made: Made, force: Expr) -> Expr:
     return made.own("bend") * bent
 
 
-def _compliance(made: Made, force: Expr) -> Expr:
+def _compliance(made: ControlExport, force: Expr) -> Expr:
     loader = made.control.loader
     push = loader.bend if loader.bend_push is None else loader.bend_push
     return either(less(force, 0.0), push, loader.bend)
 
 
-def _slope(made: Made, force: Expr) -> Expr:
+def _slope(made: ControlExport, force: Expr) -> Expr:
     """Return the bend's derivative by force, d/N; that of the whole bend with hysteresis."""
     compliance, limit = _compliance(made, force), made.control.loader.bend_limit
     if limit > 0.0:  # 1/cosh²(y) = 4·e/(e + 1)², e = exp(2y)
@@ -113,7 +113,7 @@ def _slope(made: Made, force: Expr) -> Expr:
     return made.own("bend") * compliance
 
 
-def deflection(made: Made, grip: Expr, force: Expr, carried: Expr | None) -> Expr:
+def deflection(made: ControlExport, grip: Expr, force: Expr, carried: Expr | None) -> Expr:
     """Return δ at the grip under a force, d."""
     loader = made.control.loader
     bent = bend(made, force)
@@ -124,12 +124,12 @@ def deflection(made: Made, grip: Expr, force: Expr, carried: Expr | None) -> Exp
     return grip + bent
 
 
-def _carried(made: Made, carried: Expr, force: Expr) -> Expr:
+def _carried(made: ControlExport, carried: Expr, force: Expr) -> Expr:
     half = 0.5 * made.control.loader.bend_hysteresis_width
     return within(carried, force - half, force + half)
 
 
-def add_hand(made: Made, place: str, script: Expr, target: Expr, grip: Grip) -> Grip:
+def add_hand(made: ControlExport, place: str, script: Expr, target: Expr, grip: Grip) -> Grip:
     """Add the hand's force at the end of a substep: the given force, and that of holding.
 
     `script` is the given force there, N, `target` the position at which the hand holds the grip, d.
@@ -152,7 +152,7 @@ def add_hand(made: Made, place: str, script: Expr, target: Expr, grip: Grip) -> 
     return Grip(grip.position, grip.rate, grip.grip, force, integral, carried)
 
 
-def begin(made: Made) -> Grip:
+def begin(made: ControlExport) -> Grip:
     """Return servo and grip at the end of the run before."""
     add, kept = made.system.add, made.kept
     hysteresis = made.control.loader.bend_hysteresis_share > 0.0

@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from coupled.exporting.controlexport import ControlExport
 from coupled.exporting.curve import curve_force, curve_slope
 from coupled.exporting.expression import (
     Expr,
@@ -31,7 +32,6 @@ from coupled.exporting.expression import (
     size,
     within,
 )
-from coupled.exporting.making import Made
 from coupled.rig.loader import stop_of
 
 
@@ -44,13 +44,13 @@ class Motion:
     felt: Expr | None = None
 
 
-def held(made: Made) -> bool:
-    """Tell whether F_mod does not follow δc within a substep: it is digital, or lags."""
+def held(made: ControlExport) -> bool:
+    """Return whether F_mod does not follow δc within a substep: it is digital, or lags."""
     loader = made.control.loader
     return loader.multiplier == "digital" or loader.modifying_lag > 0.0
 
 
-def modifying(made: Made, at: Expr, *, smooth: bool) -> Expr:
+def modifying(made: ControlExport, at: Expr, *, smooth: bool) -> Expr:
     """Return F_mod at δc = `at` by the host's last output; `smooth` without F_extra."""
     own, schedule = made.own, made.control.schedule
     force = curve_force(made, at) if made.control.schedule.curved else own("host/first") * at
@@ -67,19 +67,19 @@ def modifying(made: Made, at: Expr, *, smooth: bool) -> Expr:
     return force
 
 
-def _has_offset(made: Made) -> bool:
+def _has_offset(made: ControlExport) -> bool:
     loader = made.control.loader
     return loader.multiplier_offset != 0.0 or loader.multiplier_drift != 0.0
 
 
-def has_extra(made: Made) -> bool:
-    """Tell whether F_mod has a breakout of its own, F_extra of appendix C."""
+def has_extra(made: ControlExport) -> bool:
+    """Return whether F_mod has a breakout of its own, F_extra of appendix C."""
     control = made.control
     exact = control.compensation.breakout_term == "exact"
     return exact and (control.assumed_breakout > 0.0 or control.schedule.break_deflection > 0.0)
 
 
-def add_loader(made: Made, place: str, before: Expr, after: Expr, was: Motion) -> Motion:
+def add_loader(made: ControlExport, place: str, before: Expr, after: Expr, was: Motion) -> Motion:
     """Add one substep, over which the force is linear from `before` to `after`, N.
 
     `place` is the prefix of its components' names; `was` is the loader's state before.
@@ -117,7 +117,7 @@ def add_loader(made: Made, place: str, before: Expr, after: Expr, was: Motion) -
     return Motion(computed, moving, felt)
 
 
-def inertia(made: Made) -> tuple[Expr | float, Expr | float]:
+def inertia(made: ControlExport) -> tuple[Expr | float, Expr | float]:
     """Return m and c: the file's, or those set by the host from the gradient."""
     loader, host = made.control.loader, made.control.compensation
     mass: Expr | float = loader.mass
@@ -128,7 +128,7 @@ def inertia(made: Made) -> tuple[Expr | float, Expr | float]:
     return mass, damping
 
 
-def _spring(made: Made, at: Expr) -> tuple[Expr, Expr]:
+def _spring(made: ControlExport, at: Expr) -> tuple[Expr, Expr]:
     """Return slope and force of the smooth springs at δc = `at`."""
     loader, schedule, own = made.control.loader, made.control.schedule, made.own
     stiffness = 3.0 * loader.cubic * at * at + loader.basic_gradient
@@ -144,7 +144,7 @@ def _spring(made: Made, at: Expr) -> tuple[Expr, Expr]:
 
 
 def _halfway(
-    made: Made, place: str, was: Motion, inert: Expr, pushed: Expr
+    made: ControlExport, place: str, was: Motion, inert: Expr, pushed: Expr
 ) -> tuple[Expr, Expr | None]:
     """Return u, and with a breakout also u₀, which moves the control to neutral."""
     system, loader, h = made.system, made.control.loader, made.own("step-s")
@@ -162,14 +162,14 @@ def _halfway(
     return system.add(f"{place}/halfway", solved), neutral
 
 
-def _level(made: Made, rate: Expr) -> Expr:
+def _level(made: ControlExport, rate: Expr) -> Expr:
     """Return friction's size at a speed: F_c + (F_s − F_c)·exp(−(v/v_s)²)."""
     loader = made.control.loader
     ratio = rate / loader.stribeck_rate
     return loader.friction + (loader.breakaway - loader.friction) * exponential(-(ratio * ratio))
 
 
-def breakout(made: Made) -> Expr | float | None:
+def breakout(made: ControlExport) -> Expr | float | None:
     """Return the preload about neutral, N: the loader's, and a hybrid's from the host."""
     own = made.control.loader.breakout
     if has_extra(made) and not held(made):
@@ -203,7 +203,7 @@ def _solved(
     )
 
 
-def _rate(made: Made, v: Expr, halfway: Expr) -> Expr:
+def _rate(made: ControlExport, v: Expr, halfway: Expr) -> Expr:
     """Return δc' at the end of a substep: 2u − δc', or 0 where friction holds it."""
     loader = made.control.loader
     after = 2.0 * halfway - v
@@ -213,7 +213,7 @@ def _rate(made: Made, v: Expr, halfway: Expr) -> Expr:
     return after
 
 
-def _too_slow(made: Made, rate: Expr, pull: Expr) -> Expr:
+def _too_slow(made: ControlExport, rate: Expr, pull: Expr) -> Expr:
     """Return whether a control at neutral with this speed is stopped there in a substep."""
     preload = breakout(made)
     assert preload is not None
@@ -222,7 +222,7 @@ def _too_slow(made: Made, rate: Expr, pull: Expr) -> Expr:
     return 1.0 - greater(mass * size(rate), made.own("step-s") * surplus)
 
 
-def _feel(made: Made, name: str, felt: Expr | None, at: Expr) -> Expr:
+def _feel(made: ControlExport, name: str, felt: Expr | None, at: Expr) -> Expr:
     """Return F_mod on the loader if it is held: at once, or advanced by half a substep."""
     digital = made.control.loader.multiplier == "digital"
     wanted = made.own("host/held") if digital else modifying(made, at, smooth=False)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from coupled.exporting.beside import Beside
+from coupled.exporting.comparison import FlightErrors
 from coupled.exporting.keys import approximated
 from coupled.exporting.model import model_name
 from coupled.exporting.system import System
@@ -25,7 +25,7 @@ def readme_text(
     substeps: int,
     rate_Hz: float,
     scripts: Sequence[str],
-    flights: Sequence[Beside],
+    flights: Sequence[FlightErrors],
     left: Sequence[str],
     scripted: Sequence[str],
 ) -> str:
@@ -108,7 +108,7 @@ def _properties(systems: Mapping[str, System]) -> str:
     return "\n".join(lines)
 
 
-def _errors(flights: Sequence[Beside]) -> str:
+def _errors(flights: Sequence[FlightErrors]) -> str:
     lines = [
         "## Comparison with coupled's own flights",
         "",

@@ -39,9 +39,9 @@ class Move:
 
 @dataclass
 class Script:
-    """A script: settings before the start, at it, and in flight.
+    """A script: settings before the start, at the start, and in flight.
 
-    `led` is over time, `following` over another property; `moved` starts from the trimmed value.
+    `led` are tables over time, `following` over a property; `moved` starts from the trimmed value.
     """
 
     before: dict[str, float] = field(default_factory=dict)

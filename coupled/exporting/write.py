@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 from coupled.errors import InputError
 from coupled.exporting.alone import PROGRAM, fly_alone
-from coupled.exporting.befalling import add_conditions
-from coupled.exporting.beside import Beside, alone_record, beside, properties
+from coupled.exporting.comparison import FlightErrors, alone_record, compare, properties
+from coupled.exporting.conditions import add_conditions
 from coupled.exporting.control import control_system
 from coupled.exporting.keys import check_keys, is_scripted
 from coupled.exporting.load import check_load, set_load
@@ -55,7 +55,7 @@ class Export(Displayed, Tabular):
     rig: Rig
     files: Files
     substeps: int
-    beside: tuple[Beside, ...] = ()
+    beside: tuple[FlightErrors, ...] = ()
     left: tuple[str, ...] = ()
     scripted: tuple[str, ...] = ()
     said: str = ""
@@ -67,12 +67,12 @@ class Export(Displayed, Tabular):
         return f"Export({self.rig.name}: {len(self.files)} files, {flights})"
 
     def as_dict(self) -> list[dict[str, object]]:
-        """Return how far each flight is from our own, as JSON takes it."""
+        """Return the differences of each flight from our own as JSON data."""
         return [one.as_dict() for one in self.beside]
 
     def to_polars(self) -> pl.DataFrame:
-        """Return how far each flight is from our own, a row a flight."""
-        return frame_of(self.as_dict(), [field.name for field in fields(Beside)])
+        """Return the differences of each flight from our own, one row per flight."""
+        return frame_of(self.as_dict(), [field.name for field in fields(FlightErrors)])
 
     @property
     def within(self) -> bool:
@@ -130,7 +130,7 @@ def export(
         files |= run_files(rig, configured, configuration, name, files, record)
         flown.append((configured, configuration, name, record))
     files[PurePosixPath("fly.py")] = PROGRAM.encode()
-    found, said = list[Beside](), ""
+    found, said = list[FlightErrors](), ""
     if check and flown:
         with tempfile.TemporaryDirectory(prefix="coupled-") as temporary:
             put(files, Path(temporary))
@@ -140,7 +140,7 @@ def export(
                     progress(label, len(jobs) + done, 2 * len(jobs))
                 alone, now = fly_exported(Path(temporary), name, manoeuvre, record)
                 said = said or now
-                found.append(beside(manoeuvre, configuration, record, alone))
+                found.append(compare(manoeuvre, configuration, record, alone))
     made = Export(rig, files, substeps, tuple(found), tuple(left), tuple(scripted), said)
     scripts = [f"scripts/{name}.xml" for _, _, name, _ in flown]
     flights = (made.beside, made.left, made.scripted)
@@ -175,7 +175,7 @@ def rig_files(rig: Rig, systems: dict[str, System], file: object = "rig") -> Fil
 
 
 def script_name(manoeuvre: Manoeuvre, configuration: str, runs: Sequence[Flown]) -> str:
-    """Return the name of a script: the run's, its case's number if it has several, and how."""
+    """Return the name of a script: run, number of the case if there are several, configuration."""
     cases = [run.manoeuvre for run in runs if run.manoeuvre.name == manoeuvre.name]
     labels = [case.label for case in cases]
     number = f"-{labels.index(manoeuvre.label) + 1}" if len(cases) > 1 else ""

@@ -47,9 +47,9 @@ from coupled.flight.everyframe import (
 from coupled.flight.gusts import GUST_DOWN
 from coupled.flight.modelfile import catalogue, loadable, models_in, properties_read
 from coupled.flight.modelparts import NothingToScaleError
+from coupled.flight.modelreset import put_back, stall_limits
 from coupled.flight.modeltext import UnreadableModelError
 from coupled.flight.newton import Elevators, newton_trim, why_unbalanced
-from coupled.flight.putback import put_back, stall_limits
 from coupled.flight.surfacemap import flown_through, stops_found
 from coupled.flight.wrapper import Step, Wrapper, led_by
 from coupled.record.channels import ALTITUDE, LONGITUDINAL, SURFACES, motion_channels
@@ -254,12 +254,12 @@ class JSBSimAirframe:
         self._main = main
         lacking = self._flight.properties.keys() - self._catalog.keys()
         if lacking and (wanted := lacking & properties_read(main)):
-            # Another program creates them, as FlightGear does: before loading, as that does.
+            # External programs as FlightGear create them before loading.
             return self._load(models, frame_s, wrappers, created | wanted)
         return fdm
 
-    def _unmade(self) -> InputError | None:
-        """Return the fault of a model that reads properties which nothing creates, if it does."""
+    def _uncreated(self) -> InputError | None:
+        """Return the error of a model that reads properties which are never created, or None."""
         names = sorted(properties_read(self._main) - self._catalog.keys())
         if not names:
             return None
@@ -292,7 +292,7 @@ class JSBSimAirframe:
         return node
 
     def _motion_read(self, name: str) -> Read:
-        """Return the function that reads a property of the motion, or what a rig has for it."""
+        """Return the function that reads a property of the motion, or its substitute on a rig."""
         control = _POSITIONS.get(name, "")
         given = self._flight.surfaces.get(control)
         if given is None or not given.position:
@@ -356,7 +356,7 @@ class JSBSimAirframe:
                 fdm["simulation/do_simple_trim"] = 1
         except (RuntimeError, jsbsim.BaseError) as error:
             said = _log.text or str(error)
-            if "does not exist" in f"{said}{error}" and (unmade := self._unmade()) is not None:
+            if "does not exist" in f"{said}{error}" and (unmade := self._uncreated()) is not None:
                 raise unmade from None
             problem = "JSBSim: " + " ".join(said.split())[-120:]
         if problem:
@@ -402,7 +402,7 @@ class JSBSimAirframe:
                     node.set_double_value(1.0)
 
     def _why(self, elevators: Elevators) -> str:
-        """Return why a started aircraft does not trim, in words; empty if that is not known."""
+        """Return why a started aircraft does not trim, or "" if the reason is not known."""
         try:
             why = why_unbalanced(self._fdm, self._flight, elevators)
         except (RuntimeError, jsbsim.BaseError):
@@ -414,7 +414,7 @@ class JSBSimAirframe:
     def restarter(self) -> Callable[[], None] | None:
         """Return the function that resets and trims the aircraft; None if a reset loses its stall.
 
-        Only for one that has not been reset, and without acting wrappers (`kept`).
+        Only for one that has not been reset, and without acting wrappers (`aircraftcache`).
         """
         set_limits = stall_limits(self._fdm, self._main)
         if set_limits is None:
@@ -479,7 +479,7 @@ class JSBSimAirframe:
         return list(self._catalog)
 
     def has(self, name: str) -> bool:
-        """Tell whether the model has a property."""
+        """Return whether the model has a property."""
         return name in self._catalog
 
     def lever(self, name: str, file: object = None, key: str = "model") -> Lever:

@@ -79,14 +79,14 @@ class Events(Wrapper):
             for make in makers
             if (move := make(aircraft, event, self._file, f"event.{name}")) is not None
         ]
-        return happening(moves, self._frame_s)
+        return event_hook(moves, self._frame_s)
 
 
-def happening(moves: list[tuple[Event, Move]], frame_s: float) -> Hook:
+def event_hook(moves: list[tuple[Event, Move]], frame_s: float) -> Hook:
     """Return a hook that moves all events begun by the start of each frame."""
     frame = 0
 
-    def happen() -> None:
+    def apply_events() -> None:
         nonlocal frame, moves
         time = (frame + EARLY) * frame_s
         frame += 1
@@ -95,7 +95,7 @@ def happening(moves: list[tuple[Event, Move]], frame_s: float) -> Hook:
                 move(min((time - event.at) / event.over, 1.0) if event.over > 0.0 else 1.0)
         moves = [(event, move) for event, move in moves if time < event.at + event.over]
 
-    return happen
+    return apply_events
 
 
 def service_events(
@@ -103,7 +103,7 @@ def service_events(
 ) -> Hook | None:
     """Return a hook that sets the loaders' services of a flying rig before each frame, if any."""
     moves = [(e, _service(controls, names, e)) for e in events.values() if e.service is not None]
-    return happening(moves, frame_s) if moves else None
+    return event_hook(moves, frame_s) if moves else None
 
 
 def _service(controls: ControlArray, names: Sequence[str], event: Event) -> Move:

@@ -201,9 +201,9 @@ def stepper(
 
 
 class PlainAircraft(NamedTuple):
-    """An aircraft without acting wrappers, and when to check it.
+    """An aircraft without acting wrappers, and its ground check.
 
-    Below the connection's safe altitude, and if the height is NaN, `trouble` tells whether the
+    Below the connection's safe altitude, and if the height is NaN, `trouble` returns whether the
     flight must end. `nodes` are the objects whose addresses the connection has.
     """
 

@@ -55,7 +55,7 @@ LATENCIES: tuple[Standard, ...] = (
 RATES = (SMALL_RATE, RATE)  # compared with the rigid flight
 REFERENCE = "rigid"
 
-SHARES: tuple[Figure, ...] = ("loss", "loss_closed_form")  # of a whole; a bound of 1 is no bound
+SHARES: tuple[Figure, ...] = ("loss", "loss_closed_form")  # a bound of 1 is trivial
 RELATIVE: tuple[Figure, ...] = (*SHARES, "asked_norm", "reached_norm", "hand_travel_norm")
 RELATIVE += ("surface_stop_norm",)
 RELATIVE += ("felt_ratio", "felt_ratio_closed_form")
@@ -119,7 +119,7 @@ class Expect(Section):
         return REFERENCE if self.standard in RATES else self.minus
 
     def concerns(self, case: str, configuration: str) -> bool:
-        """Tell whether the expectation applies to a flight."""
+        """Return whether the expectation applies to a flight."""
         if self.case not in (None, case) or configuration == self.reference:
             return False
         return self.configuration in (None, configuration)

@@ -13,9 +13,9 @@ from typing import Any, NamedTuple
 from coupled.flight.bench import Airframe
 from coupled.flight.companion import Companion
 from coupled.flight.everyframe import PlainSteps
+from coupled.flight.flightservices import FlightServices
 from coupled.flight.manoeuvre import Manoeuvre
 from coupled.flight.pilot.base import Look
-from coupled.flight.served import Served
 from coupled.record.channels import ALTITUDE
 from coupled.record.record import EndedEarly
 from coupled.rig.placed import Commands, HalfFrames, Placed
@@ -62,7 +62,7 @@ class Frames:
         manoeuvre: Manoeuvre,
         airframe: Airframe,
         placed: Placed,
-        served: Served,
+        served: FlightServices,
         looks: Sequence[tuple[Any, Look]] = (),
         companion: Companion | None = None,
         split: Split | None = None,
@@ -81,7 +81,7 @@ class Frames:
         return bool(listened or self._manoeuvre.record_properties)
 
     def fly(self, frames: int, progress: Progress | None = None) -> None:
-        """Fly so many frames, or up to the one that ends the flight."""
+        """Fly a number of frames, or up to the one that ends the flight."""
         eventful = self._eventful or self._split is not None
         plain = None if eventful else self._airframe.plain_frames(self._placed)
         try:

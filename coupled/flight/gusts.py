@@ -31,16 +31,16 @@ _BLOCK = 1024  # frames made at a time
 
 
 class GivenAir(NamedTuple):
-    """The motion of the air over each frame, m/s, in place of the rig's gusts; None where drawn.
+    """The air velocity over each frame, m/s, instead of the rig's gusts; None if drawn at random.
 
-    `up` is its vertical speed, `across` that across the heading, from the left positive.
+    `up` is the vertical component, `across` the component across the heading, from the left.
     """
 
     up: Sequence[float] | None = None
     across: Sequence[float] | None = None
 
     def repeated(self, times: int) -> GivenAir:
-        """Return the air of frames that are divided into so many steps."""
+        """Return the air of frames that are divided into equal steps."""
         return GivenAir(*(None if one is None else np.repeat(one, times).tolist() for one in self))
 
     def in_pairs(self) -> GivenAir:
@@ -113,8 +113,8 @@ class Gusts(Wrapper):
         flight, given = self._flight, self._air
         up = self._speeds(aircraft, given.up, flight.gust_rms, _UP)
         across = self._speeds(aircraft, given.across, flight.lateral_gust_rms, _ACROSS)
-        hooks = [] if up is None else [_rising(aircraft, up)]
-        hooks += [] if across is None else [_crossing(aircraft, across)]
+        hooks = [] if up is None else [_vertical_gust_hook(aircraft, up)]
+        hooks += [] if across is None else [_lateral_gust_hook(aircraft, across)]
         return together(hooks)
 
     def _speeds(
@@ -130,23 +130,23 @@ class Gusts(Wrapper):
         return dryden(rms_m_per_s, *lengths, self._frame_s, self._seed, stream)
 
 
-def _rising(aircraft: Aircraft, speeds: Iterator[float]) -> Hook:
+def _vertical_gust_hook(aircraft: Aircraft, speeds: Iterator[float]) -> Hook:
     down = aircraft.lever(GUST_DOWN).set
 
-    def blow() -> None:
+    def set_gust() -> None:
         down(-next(speeds, 0.0) / FOOT_m)
 
-    return blow
+    return set_gust
 
 
-def _crossing(aircraft: Aircraft, speeds: Iterator[float]) -> Hook:
+def _lateral_gust_hook(aircraft: Aircraft, speeds: Iterator[float]) -> Hook:
     north, east = aircraft.lever(_GUST_NORTH).set, aircraft.lever(_GUST_EAST).set
     heading = aircraft.reader(_HEADING)
     assert heading is not None
 
-    def blow() -> None:
+    def set_gust() -> None:
         speed, turned = next(speeds, 0.0) / FOOT_m, heading()
         north(-speed * math.sin(turned))
         east(speed * math.cos(turned))
 
-    return blow
+    return set_gust

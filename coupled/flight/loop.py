@@ -12,14 +12,14 @@ from typing import Any
 
 from coupled.errors import InputError
 from coupled.flight.aircraft import make_aircraft
+from coupled.flight.aircraftcache import AircraftCache, CachedAircraft
 from coupled.flight.airframe import JSBSimAirframe
 from coupled.flight.bench import Airframe, Bench
 from coupled.flight.companion import Companion
 from coupled.flight.conditions import condition_wrappers
-from coupled.flight.direct import check_direct_controls
+from coupled.flight.directcontrols import check_direct_controls
 from coupled.flight.frames import Progress
 from coupled.flight.gusts import DRAWN, GivenAir, Gusts
-from coupled.flight.kept import AircraftCache, CachedAircraft
 from coupled.flight.manoeuvre import Manoeuvre
 from coupled.flight.started import StartedFlight
 from coupled.flight.trimmable import with_speeds

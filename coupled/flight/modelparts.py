@@ -277,7 +277,7 @@ def _scale_dependent(aerodynamics: Element, scaled: Scaled) -> bool:
     without = set[str]()  # functions independent of the quantity
 
     def depends(function: Element) -> bool:
-        """Tell whether a function depends on the quantity; copy the functions in between."""
+        """Return whether a function depends on the quantity; copy the functions in between."""
         hit = False
         for part in function.iter():
             name = _property(part)

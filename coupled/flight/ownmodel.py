@@ -26,7 +26,7 @@ from coupled.rig.parameters import Flight
 
 TRIED = "coupled.flight.tryout"  # module of that process
 REFUSED = 3  # exit code of a process that reports the fault itself
-UNMADE = 4  # likewise, of properties that nothing creates
+UNCREATED = 4  # likewise, of properties that nothing creates
 LONGEST_s = 60.0  # a packaged model takes less than 2 s on a slow machine
 # Keys of a flight section that change the loaded files or their content.
 _LOADED = (
@@ -48,7 +48,7 @@ def check_own_model(
         return
     named = sorted(flight.properties)
     asked = json.dumps([*(getattr(flight, name) for name in _LOADED), named])
-    said = _tried(
+    said = _load_failure(
         str(home), _state(home / flight.model), asked, _Request(flight, frame_s, tuple(controls))
     )
     if said.startswith(flight.model):
@@ -89,7 +89,7 @@ def _state(folder: Path) -> tuple[tuple[str, int, int], ...]:
 
 
 @lru_cache(maxsize=64)
-def _tried(home: str, state: object, asked: str, request: _Request) -> str:
+def _load_failure(home: str, state: object, asked: str, request: _Request) -> str:
     """Return why a model cannot be loaded; empty if it can, or if loading it here will refuse it.
 
     `state` and `asked` key the cache.
@@ -118,16 +118,16 @@ def _tried(home: str, state: object, asked: str, request: _Request) -> str:
         return ""
     lines = [line.strip() for line in done.stderr.decode("utf-8", "replace").splitlines()]
     last = next((line for line in reversed(lines) if line), "")
-    if done.returncode == UNMADE:
+    if done.returncode == UNCREATED:
         return last
     last = last[-200:]
     if done.returncode == REFUSED:
         return f"cannot be loaded: {last}"
-    why = f"crashes JSBSim when loaded ({_how(done.returncode)}): a fault of its files"
+    why = f"crashes JSBSim when loaded ({_ending(done.returncode)}): a fault of its files"
     return f"{why}; JSBSim's last message: {last}" if last else why
 
 
-def _how(code: int) -> str:
+def _ending(code: int) -> str:
     """Return how a process ended, in words."""
     if code >= 0:
         return f"exit code {code}"

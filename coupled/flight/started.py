@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 
 from coupled.flight.bench import Airframe
 from coupled.flight.companion import Companion, FlightAccess
+from coupled.flight.flightservices import FlightServices
 from coupled.flight.frames import Frames, Split
 from coupled.flight.manifest import manifest
 from coupled.flight.manoeuvre import Manoeuvre
 from coupled.flight.pilot import Action
 from coupled.flight.pilot.base import Look, Start
 from coupled.flight.pilot.own import GivenForce, OwnPilot, force_of, gradient_of, reset_law
-from coupled.flight.served import Served
 from coupled.flight.state import State
 from coupled.record.channels import PRESSURE, ControlName, record_channels
 from coupled.record.record import EndedEarly, Record
@@ -60,7 +60,7 @@ class StartedFlight:
         self._actions = _actions(manoeuvre, airframe.motion()[PRESSURE])
         self.grips = {str(name): action.hand for name, action in self._actions.items()}
         self.controls = pack(rig, self.grips)
-        self.served = Served(
+        self.served = FlightServices(
             manoeuvre, self.controls, companion is not None and companion.sets_services
         )
         self._noise = ChannelNoise(self._own_channels, rig.noise, manoeuvre.seed)
@@ -83,7 +83,7 @@ class StartedFlight:
         return {name: pilot.law for name, pilot in pilots if isinstance(pilot, OwnPilot)}
 
     def extend(self, frames: int) -> None:
-        """Let the flight have so many frames; `frames` is then another loop over them."""
+        """Extend the flight to a number of frames; `frames` is then a new loop."""
         manoeuvre, before = self.manoeuvre, len(self.data)
         rig, companion = manoeuvre.rig, self._companion
         more = self._noise.rows(frames - before)

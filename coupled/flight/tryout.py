@@ -1,8 +1,8 @@
 """The process in which a user's model is loaded, trimmed and flown for some frames (`ownmodel`).
 
-Its exit code is 0 if that succeeds, or fails with a fault that the parent will find as well. With
-the reason on the standard error it is REFUSED if Python cannot read the model, and UNMADE if the
-model reads properties that nothing creates.
+Its exit code is 0 if that succeeds, or fails with an error that the parent will find as well. With
+the reason on standard error it is REFUSED if Python cannot read the model, and UNCREATED if the
+model reads properties that are never created.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from pathlib import Path
 
 from coupled.errors import InputError
 from coupled.flight.aircraft import make_unchecked
-from coupled.flight.ownmodel import REFUSED, UNMADE
+from coupled.flight.ownmodel import REFUSED, UNCREATED
 from coupled.parallel import limit_memory
 from coupled.rig.parameters import Flight
 
@@ -36,7 +36,7 @@ def main() -> int:
         if error.key != "flight.properties":
             return 0
         print(error.problem, file=sys.stderr, flush=True)
-        os._exit(UNMADE)  # JSBSim aborts where it deletes a model that reads such a property
+        os._exit(UNCREATED)  # JSBSim aborts when it deletes such a model
     except Exception as error:
         print(f"{type(error).__name__}: {error}".replace("\n", " "), file=sys.stderr)
         return REFUSED

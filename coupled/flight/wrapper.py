@@ -32,7 +32,7 @@ class Aircraft(Protocol):
         """Return the names of all of the model's properties."""
 
     def has(self, name: str) -> bool:
-        """Tell whether the model has a property."""
+        """Return whether the model has a property."""
 
     def lever(self, name: str, file: object = None, key: str = "model") -> Lever:
         """Return a property that may be set; faults name a key of a file."""
@@ -56,7 +56,7 @@ class Wrapper:
 
     @property
     def ballasts(self) -> int:
-        """How many further point masses it needs (`modelfile.BALLAST`)."""
+        """The number of further point masses that it needs (`modelfile.BALLAST`)."""
         return 0
 
     def load(self, aircraft: Aircraft) -> None:

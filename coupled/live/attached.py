@@ -47,7 +47,7 @@ def chord(modification: Any, travel: float) -> float:
     return float(np.max(reached)) / travel
 
 
-class Attached:
+class AttachedLoader:
     """The loader on `link`; `warn` receives urgent messages for the pilot."""
 
     def __init__(
@@ -207,7 +207,7 @@ class Attached:
                 self._warn(f"the measurements of the {name} are plausible again: the forces return")
 
     def measured_now(self, i: int) -> bool:
-        """Tell whether the last call of `listen` received a new sample of control i, with δ."""
+        """Return whether the last call of `listen` received a new sample of control i, with δ."""
         return self._fresh and self._measures[i]
 
     def validity(self) -> int:

@@ -62,7 +62,7 @@ class _Cls2Sim:
         self._requested_s = -math.inf  # time of the last request, s
 
     def receive(self, wait_s: float) -> Sample | None:
-        """Return the newest sample since the last call; wait for it at most so long."""
+        """Return the newest sample since the last call; wait for it at most `wait_s`."""
         until = time.monotonic() + wait_s
         while True:
             found = self._drain()
@@ -169,7 +169,7 @@ class Version2(_Cls2Sim):
         self._basic = [control.assumed_basic_gradient for control in rig.controls.values()]
         self._bytes = b""
         self._lengths: dict[int, int] = {}  # the length in the first answer of each size
-        self._astray = False  # an answer had another length: the stream is not in step
+        self._out_of_sync = False  # an answer had another length: the stream is not in step
         self._heard_s = -math.inf  # time of the last bytes, s
         self._refused = False  # one of the pending requests was answered by an error
         self._due: deque[tuple[str, int]] = deque()  # pending requests: kind, control
@@ -226,19 +226,19 @@ class Version2(_Cls2Sim):
         came, now_s = self._wire.receive() or b"", time.monotonic()
         if came:
             self._heard_s = now_s
-        elif (self._astray or self._bytes) and now_s - self._heard_s > AGAIN_s:
-            self._bytes, self._astray, self._refused = b"", False, False
+        elif (self._out_of_sync or self._bytes) and now_s - self._heard_s > AGAIN_s:
+            self._bytes, self._out_of_sync, self._refused = b"", False, False
             self._due.clear()
-        return b"" if self._astray else came
+        return b"" if self._out_of_sync else came
 
     def _out_of_step(self, size: int) -> bool:
-        """Tell whether the next answer's length differs from that of others of its size."""
+        """Return whether the length of the next answer differs from that of others of its size."""
         (length,) = struct.unpack_from("<H", self._bytes)
-        self._astray = self._lengths.setdefault(size, length) != length
-        if self._astray:
+        self._out_of_sync = self._lengths.setdefault(size, length) != length
+        if self._out_of_sync:
             self.dropped["out of step"] += 1
             self._bytes = b""
-        return self._astray
+        return self._out_of_sync
 
     def _measured(self, i: int) -> Measured:
         counts, share = self._read[i]

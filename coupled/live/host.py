@@ -17,7 +17,7 @@ import numpy as np
 
 from coupled.errors import InputError
 from coupled.flight.companion import FlightAccess
-from coupled.live.attached import Attached
+from coupled.live.attached import AttachedLoader
 from coupled.live.hands import HandPositions, PositionFilter
 from coupled.live.link import Link
 from coupled.live.pacing import Pacer
@@ -101,7 +101,7 @@ class Host:
         self.real_loader = plan.link is not None
         self.sets_services = plan.link is None and bool(plan.watchers)
         self.events = FlightEvents()
-        self.attached: Attached | None = None
+        self.attached: AttachedLoader | None = None
         self.time_s = 0.0
         self.real_time_priority = False  # whether the system granted real-time priority
         self.access: FlightAccess | None = None
@@ -132,7 +132,7 @@ class Host:
             if plan.adapt
         }
         if plan.link is not None:
-            self.attached = Attached(plan.link, plan.limits, access, plan.paced, plan.warn)
+            self.attached = AttachedLoader(plan.link, plan.limits, access, plan.paced, plan.warn)
             self.attached.connect()
         for watcher in plan.watchers:
             watcher.begin(self)

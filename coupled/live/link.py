@@ -56,7 +56,7 @@ class Reach:
     deflection: float  # d
 
     def holds(self, measured: Measured) -> bool:
-        """Tell whether a control's measurements are finite and within the bounds."""
+        """Return whether the measurements of a control are finite and within the bounds."""
         force, computed, deflection = measured
         if not (abs(force) <= self.force_N and abs(computed) <= self.deflection):
             return False  # neither is NaN
@@ -81,7 +81,7 @@ class Link(Protocol):
         """The times from orders to their answers."""
 
     def receive(self, wait_s: float) -> Sample | None:
-        """Return the newest valid sample since the last call; wait for it at most so long."""
+        """Return the newest valid sample since the last call; wait for it at most `wait_s`."""
 
     def own_load(self, i: int, computed: float) -> float:
         """Return the host's part of the load of control i at δc in d, N.

@@ -1,4 +1,4 @@
-"""The channels of a live flight in addition to a batch flight's, one value a frame."""
+"""The channels of a live flight in addition to a batch flight's, one value per frame."""
 
 from __future__ import annotations
 
@@ -47,10 +47,10 @@ class Rows:
 def only_measured(
     record: Record, link: Link, rig: Rig, measures_deflection: Sequence[bool]
 ) -> Record:
-    """Return a record without what its loader did not measure; δ is by control.
+    """Return a record without the channels that its loader did not measure; δ by control.
 
-    F_mod of a hybrid loader is among it: the loader's own multiplier makes it of δc as it is, and
-    what the host would make of its reading would pass for a product that is held over the frame.
+    F_mod of a hybrid loader is removed too: its own multiplier computes it from the current δc, and
+    the value of the host would look like a product held over the frame.
     """
     lacking: set[str] = set()
     for (name, control), grip in zip(rig.controls.items(), measures_deflection, strict=True):

@@ -25,7 +25,7 @@ FADE_s = 0.5
 
 # A force held after a step is constant while the control still moves, for some tenths of a second
 # until the loader rests. A gauge with noise does not repeat values at all.
-STUCK_s = 2.0  # F unchanged for so long, and in the second half of that time
+STUCK_s = 2.0  # largest time of a constant F, if the control moves in its second half
 MOVED = 0.05  # of the travel moved by δc
 # Tolerance of δ − x − K·F: this share of the travel, for backlash and zeros, plus all of K·F, since
 # a structure may have softened to twice its K. Both exceed the error of a calibration.
@@ -139,7 +139,7 @@ class Limiter:
 
 
 class Plausibility:
-    """Whether one control's measurements agree with one another.
+    """The consistency of one control's measurements.
 
     `gauge`: the loader measures F.
     """
@@ -156,11 +156,11 @@ class Plausibility:
         self._fault = ""
 
     def miss(self) -> None:
-        """Take a frame without a new sample."""
+        """Process a frame without a new sample."""
         self._servo.miss()
 
     def update(self, measured: Measured) -> str:
-        """Take a new sample; return its fault, or an empty text."""
+        """Process a new sample; return its fault, or ""."""
         found = self._stuck_gauge(measured) or self._apart(measured)
         self._well_s = 0.0 if found else self._well_s + self._frame_s
         if found or self._well_s >= AGAIN_s:

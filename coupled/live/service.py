@@ -80,7 +80,7 @@ class BendEstimator:
     def update(
         self, force: float, computed: float, deflection: float, *, fresh: bool = True
     ) -> ServiceBend:
-        """Take a frame's F in N, δc and δ in d, and return the estimate.
+        """Process a frame's F in N, δc and δ in d, and return the estimate.
 
         A frame that is not `fresh` repeats the sample before it and is not used.
         """

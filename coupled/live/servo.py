@@ -36,11 +36,11 @@ class Servo:
         return self._missed == 0 and self._left_s is not None and self._left_s <= 0.0
 
     def miss(self) -> None:
-        """Take a frame without a new sample."""
+        """Process a frame without a new sample."""
         self._missed += 1
 
     def move(self, computed: float) -> float:
-        """Take a new sample of δc in d, and return x in d."""
+        """Process a new sample of δc in d, and return x in d."""
         frames, self._missed = self._missed + 1, 0
         if self._left_s is None or (frames - 1) * self._frame_s > BRIDGED_s:
             first = self._left_s is None

@@ -68,10 +68,10 @@ def fly_live(manoeuvre: Manoeuvre, plan: Plan, progress: Progress | None = None)
 
 
 def as_measured(manoeuvre: Manoeuvre) -> Manoeuvre:
-    """Return the manoeuvre as a host flies it whose loader is real.
+    """Return the manoeuvre for a host with a real loader.
 
-    What simulates the loader's electronics, its gauge and its noise, is left out: the readings
-    have their own.
+    The simulated electronics, gauge and noise are removed, since the readings include the real
+    ones.
     """
     rig = manoeuvre.rig
     neutral: dict[str, Any] = {"noise": {}}

@@ -69,7 +69,7 @@ class Transport:
         return None if self.closed else packet
 
     def wait(self, seconds: float) -> None:
-        """Wait until data arrive, at most so long."""
+        """Wait until data arrive, at most `seconds`."""
         # A closed stream is always readable, so select would return at once.
         select.select([] if self.closed else [self._socket], [], [], max(0.0, seconds))
 

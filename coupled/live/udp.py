@@ -113,7 +113,7 @@ class UdpLink:
         return sample
 
     def _restarted(self, header: Header, now_s: float) -> bool:
-        """Tell whether a state with an older sequence number is of a restarted loader.
+        """Return whether a state with an older sequence number is of a restarted loader.
 
         A restarted loader counts from 1 again. Its state answers an order that was sent after the
         last one answered, unlike a repeated or delayed packet. Sequence numbers may restart only

@@ -49,7 +49,7 @@ class Header:
 
 
 def newer(sequence: int, last: int) -> bool:
-    """Tell whether a sequence number is newer than another; it wraps after 2³² − 1."""
+    """Return whether a sequence number is newer than another; it wraps after 2³² − 1."""
     return 0 < (sequence - last) % (1 << 32) < HALF
 
 

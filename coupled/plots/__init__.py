@@ -1,1 +1,1 @@
-"""Figures: the only room that imports matplotlib. Angles are drawn in degrees."""
+"""Figures. Only this package imports matplotlib. Angles are drawn in degrees."""

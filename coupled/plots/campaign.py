@@ -1,4 +1,4 @@
-"""A sweep drawn: each kept figure against each parameter that varies."""
+"""The figure of a sweep: each figure of merit against each varied parameter."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from coupled.campaign.entry import AS_FILED
 from coupled.display import System, parameter_label
 from coupled.plots.grids import draw_grid, is_grid
 from coupled.plots.layout import Layout, for_print
-from coupled.plots.sweepview import coincident, in_unit, mark_ended, place_of, titled, varying
+from coupled.plots.sweepview import coincident, full_title, in_unit, label_x, mark_ended, varying
 
 _COLOURS = ("black", "#d55e00", "#0072b2", "#009e73", "#cc79a7", "#e69f00")
 _MOST_COLUMNS = 4
@@ -30,16 +30,14 @@ def draw_sweep(
     system: System = "si",
     layout: Layout = _USUAL,
 ) -> Figure:
-    """Draw up to four figures, a row each; those that do not vary are named in the title.
+    """Draw up to four figures of merit, one row each; the title has constant ones and `remarks`.
 
-    So are the `remarks`, sentences on what the figures alone do not show.
+    A grid over two parameters is drawn as lines or as a map. Any other sweep has one column for
+    each numeric parameter, up to four. Colours are configurations, or the values of the next
+    parameter if there is one configuration only. Crosses below are flights that ended early.
 
-    A grid over two parameters is drawn as lines or a map. Of any other, up to four parameters
-    with numbers have a column each, and a colour stands for a configuration; with a single one,
-    for the next parameter's value. The flights that ended early are crosses on the lower edge.
-
-    The layout may name some of the figures, and overlay the configurations of a grid's lines.
-    Raises InputError for a figure that is not there, and for maps overlaid.
+    `layout` may select figures, and overlay the configurations of a grid's lines. Raises InputError
+    for an unknown figure, and for overlaid maps.
     """
     numeric = [key for key in keys if found[key].dtype.is_numeric()][:_MOST_COLUMNS] or ["flight"]
     figures, still = varying(found, layout.chosen(figures), system)
@@ -50,17 +48,17 @@ def draw_sweep(
         return for_print(draw_grid(found, pair, figures, heading, system, layout), layout)
     width, height = layout.size(max(1.5 + 3.6 * len(numeric), 5.5), 1.1 + 2.3 * len(figures))
     drawn = Figure(figsize=(width, height), layout="constrained")
-    drawn.suptitle(titled(title, remark, width), fontsize=11)
+    drawn.suptitle(full_title(title, remark, width), fontsize=11)
     panels = drawn.subplots(len(figures), len(numeric), squeeze=False, sharex="col", sharey="row")
     for row, name in enumerate(figures):
         shown = kept_figure(name, system)
         figure = in_unit(found, name, shown)
         for column, key in enumerate(numeric):
-            _panel(panels[row, column], figure, keys, key, _other(numeric, column), name)
+            _panel(panels[row, column], figure, keys, key, _colour_key(numeric, column), name)
         panels[row, 0].set_ylabel(shown.label)
     for column, key in enumerate(numeric):
-        place_of(panels[-1, column], key, found[key])
-        _add_colours(drawn, panels[:, column], _other(numeric, column))
+        label_x(panels[-1, column], key, found[key])
+        _add_colours(drawn, panels[:, column], _colour_key(numeric, column))
     handles, labels = panels[0, 0].get_legend_handles_labels()
     if len(labels) > 1 or "ended early" in labels:
         drawn.legend(handles, labels, loc="outside lower center", ncols=3, fontsize=8)
@@ -68,7 +66,7 @@ def draw_sweep(
 
 
 def _add_colours(drawn: Figure, column: Any, other: str) -> None:
-    """Say above a column what its colours stand for, where they stand for a parameter."""
+    """Add a colour bar above a column whose colours are the values of a parameter."""
     points = column[0].collections
     if not other or not points:
         return
@@ -78,8 +76,8 @@ def _add_colours(drawn: Figure, column: Any, other: str) -> None:
     bar.set_label(parameter_label(other), fontsize=8)
 
 
-def _other(keys: Sequence[str], column: int) -> str:
-    """Return the parameter that colours a column, if there is another."""
+def _colour_key(keys: Sequence[str], column: int) -> str:
+    """Return the parameter that colours a column, or "" if there is no other parameter."""
     return keys[(column + 1) % len(keys)] if len(keys) > 1 else ""
 
 
@@ -94,7 +92,8 @@ def _panel(
         if other and len(configurations) == 1:
             axes.scatter(rows[key], rows[name], 16, c=rows[other], cmap="viridis")
             continue
-        # A line joins the flights that differ in this parameter alone; of a draw none do.
+        # A line joins flights that differ in this parameter only. In a random sample there are
+        # none.
         label = "" if configuration == AS_FILED else configuration
         for line in rows.partition_by(alone, maintain_order=True) if alone else [rows]:
             axes.plot(line[key], line[name], "o-", ms=3.5, lw=1.0, color=colour, label=label)

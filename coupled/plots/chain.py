@@ -1,4 +1,4 @@
-"""The signal chain with its gaps, and the residual of the guilty stages over time."""
+"""The signal chain with the normalised residual of each stage, and residuals over time."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from coupled.gap.thresholds import FAULTY_FROM
 from coupled.plots import gapview as look
 from coupled.plots.gapview import View, channel_shown
 
-_MOST = 4  # residuals drawn
+_MOST = 4  # most residuals drawn
 _FILL = {"guilty": "#f6d5bf", "clear": "#cfeae0", "not judged": "0.93"}
 _EDGE = {"guilty": look.WRONG, "clear": look.RIGHT, "not judged": "0.6"}
 
 
 def draw_stages(view: View) -> Figure:
-    """Draw where along the chain the gap lies, and the residual there before and after."""
+    """Draw the signal chain, and the residuals of the faulty stages before and after the fit."""
     outputs = view.suspects()
     shown = outputs[:_MOST]
     figure = Figure(figsize=(10.4, 2.1 + 2.1 * len(shown)), layout="constrained")
@@ -41,13 +41,13 @@ def draw_stages(view: View) -> Figure:
     handles, labels = figure.axes[1].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=4, fontsize=8.5)
     more = len(outputs) - len(shown)
-    rest = f" ({more} narrower residuals are not drawn)" if more else ""
+    rest = f" ({more} smaller residuals are not drawn)" if more else ""
     figure.suptitle(f"Where the {view.diagnosis.control}'s gap lies{rest}", fontsize=12)
     return figure
 
 
 def _draw_chain(axes: Any, stages: dict[str, StageResult]) -> None:
-    """Draw a box a stage, in the order of the chain: its residual over its floor."""
+    """Draw one box per stage, in the order of the chain, with its normalised residual."""
     axes.set_axis_off()
     axes.set_xlim(-0.05, len(STAGES) - 0.15)
     axes.set_ylim(0.0, 1.0)
@@ -81,7 +81,7 @@ def _state(found: StageResult | None) -> str:
 
 
 def _caption(found: StageResult | None) -> str:
-    """Return what stands in a stage's box."""
+    """Return the text in the box of a stage."""
     if found is None:
         return "not in\nthis record"
     if found.gap is None:
@@ -96,7 +96,7 @@ def _caption(found: StageResult | None) -> str:
 
 
 def _draw_residual(axes: Any, view: View, output: Output, wide: bool) -> None:
-    """Draw a residual over time, before and after (`wide`), or what is left of it alone."""
+    """Draw a residual over time: before and after the fit if `wide`, else after it only."""
     shown = channel_shown(output.channel, view.system, fine=True)
     factor, time = shown.factor * output.floor, view.time(output)
     before = factor * output.residual(view.diagnosis.nominal)
@@ -114,7 +114,7 @@ def _draw_residual(axes: Any, view: View, output: Output, wide: bool) -> None:
     if wide:
         clear = view.diagnosis.verdict == "no_gap"
         color = look.RIGHT if clear else look.WRONG
-        axes.plot(time, before, color=color, linewidth=0.9, label="measured less nominal")
+        axes.plot(time, before, color=color, linewidth=0.9, label="measured − nominal")
         title = f"{output.stage}: {shown.words}{view.source(output)}"
         axes.set_title(title, fontsize=9, loc="left")
     if improved:
@@ -130,7 +130,7 @@ def _draw_residual(axes: Any, view: View, output: Output, wide: bool) -> None:
 
 
 def _shade_held(axes: Any, output: Output, time: Any) -> None:
-    """Shade the stretches that no fit saw."""
+    """Shade the held-out stretches, which no fit used."""
     edges = np.diff(np.concatenate(([0], output.rows("held").astype(int), [0])))
     starts, ends = np.flatnonzero(edges > 0), np.flatnonzero(edges < 0) - 1
     for i, (start, end) in enumerate(zip(starts, ends, strict=True)):

@@ -1,4 +1,4 @@
-"""Figures of the control checks of 14 CFR Part 60, their tolerances drawn."""
+"""Figures of the control checks of 14 CFR Part 60, with their tolerances."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 
 def draw_static_checks(found: Documentation, system: System = "si") -> Figure:
-    """Draw the static control check: force, and surface, within their tolerance bands."""
+    """Draw the static control check: force and surface position, with their tolerance bands."""
     shown, newtons = deflection_shown(found.control, system), in_system("N", system)
     factor = shown.factor
     data = found.rig.controls[found.control]
@@ -79,7 +79,7 @@ def draw_static_checks(found: Documentation, system: System = "si") -> Figure:
 
 
 def _verdict(found: Documentation, pressure_Pa: float, kinds: Sequence[str], system: System) -> str:
-    """Return the q̄, and whether the checks of these kinds pass there, the least margin named."""
+    """Return q̄, whether all checks of these kinds pass at it, and the smallest margin."""
     ours = [
         check
         for check in found.checks
@@ -94,20 +94,18 @@ def _verdict(found: Documentation, pressure_Pa: float, kinds: Sequence[str], sys
 
 
 def draw_releases(found: Documentation, system: System = "si") -> Figure:
-    """Draw the dynamic control check: releases, with the tolerance of crossings and overshoots."""
+    """Draw the dynamic control check: releases, with the tolerances of crossings and overshoots."""
     figure, grid = case_panels(2, len(found.conditions), 2.7)
     for i, condition in enumerate(found.conditions):
-        for axes, (side, both) in zip(grid[:, i], condition.let_go.items(), strict=True):
+        for axes, (side, both) in zip(grid[:, i], condition.releases.items(), strict=True):
             now, wanted = both.felt, both.specified
             swing = swing_of(wanted)
-            for let_go, style in (
+            for one, style in (
                 (wanted, {"color": "black", "linestyle": "dotted", "label": "specified"}),
                 (now, {"color": BLUE, "label": "rig"}),
             ):
-                share = 100.0 * let_go.deflection / let_go.start
-                from_90 = (
-                    let_go.time_s - swing_of(let_go).begin_s
-                )  # as the rule counts, and the table
+                share = 100.0 * one.deflection / one.start
+                from_90 = one.time_s - swing_of(one).begin_s  # as in the rule
                 axes.plot(from_90, share, linewidth=1.3, **style)
             _draw_tolerance(axes, wanted, swing)
             axes.grid(alpha=0.25)
@@ -135,14 +133,14 @@ def _span(wanted: Release, swing: Swing) -> float:
 
 
 def _draw_tolerance(axes: Any, wanted: Release, swing: Swing) -> None:
-    """Draw where the rule lets the specified curve's 10 %, crossings and overshoots lie."""
+    """Draw the tolerances of the 10 % crossing, the zero crossings and the overshoots."""
     share, time = wanted.deflection / wanted.start, wanted.time_s - swing.begin_s
     style = {"color": ORANGE, "linewidth": 5.0, "alpha": 0.55, "solid_capstyle": "butt"}
     if not swing.peaks.size:
         low, high = (swing.fall_s * (1.0 + s * TIME_SHARE) for s in (-1.0, 1.0))
         axes.plot([low, high], [10.0, 10.0], label="tolerance", **style)
         return
-    crossings = swing.crossings[: len(swing.peaks) + 1 : 2]  # whole periods apart
+    crossings = swing.crossings[: len(swing.peaks) + 1 : 2]  # one period apart
     wide = 0.0
     for n, (crossing, before) in enumerate(zip(crossings, [0.0, *crossings], strict=False)):
         wide += TIME_SHARE * (n + 1) * (crossing - before)

@@ -1,4 +1,4 @@
-"""The first pages of a force documentation's PDF: its cover, and the table of its checks."""
+"""The first pages of the PDF of a force documentation: the cover and the table of checks."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ from coupled.plots.histories import plain
 from coupled.record.channels import ControlName
 from coupled.version import __version__
 
-PAGE = (8.27, 11.0)  # inches: within A4 and Letter
+PAGE = (8.27, 11.0)  # inches; fits A4 and Letter
 _LEFT, _VALUES, _RIGHT = 0.1, 0.36, 0.92
-_LINE = 0.0165  # of the page's height
-_ROWS = 46  # of a page of the table
+_LINE = 0.0165  # share of the page height
+_ROWS = 46  # rows of the table on one page
 _HEADS = ("test", "control", "q̄, kPa", "check", "rig", "reference", "±", "", "result", "fig.")
 _AT = (0.07, 0.18, 0.285, 0.31, 0.60, 0.69, 0.76, 0.77, 0.815, 0.92)
 _RIGHTS = (False, False, True, False, True, True, True, False, False, True)
@@ -33,7 +33,7 @@ Numbers = Mapping[tuple[ControlName, Kind], int]
 
 
 def draw_cover(documents: Sequence[Documentation], issue: Issue) -> Figure:
-    """Draw the cover: what the document is of, which issue, and who signs it."""
+    """Draw the cover: the subject of the document, its issue, and lines for signatures."""
     figure = Figure(figsize=PAGE)
     figure.text(_LEFT, 0.86, "Force documentation", fontsize=22, weight="bold")
     figure.text(_LEFT, 0.82, plain(documents[0].rig.name), fontsize=16)
@@ -60,7 +60,7 @@ def _rule(start: float, end: float, y: float) -> Line2D:
 def draw_check_table(
     documents: Sequence[Documentation], issue: Issue, numbers: Numbers, system: System = "si"
 ) -> list[Figure]:
-    """Draw the table of all checks; `numbers` are those of the figures that show them."""
+    """Draw the table of all checks; `numbers` are the numbers of the figures that show them."""
     rows = [
         row
         for found in documents

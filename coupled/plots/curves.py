@@ -1,4 +1,4 @@
-"""The curves of a diagnosis: values over their signal, with intervals, and where the record was."""
+"""The fitted curves of a diagnosis, with intervals and the range of the data."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from coupled.plots.gapview import FAINT, RIGHT, View
 
 
 def draw_curves(view: View) -> Figure:
-    """Draw each curve found, a panel each."""
+    """Draw one panel per fitted curve."""
     curves = view.diagnosis.curves
     figure = Figure(figsize=(1.0 + 4.6 * len(curves), 4.0), layout="constrained")
     panels = figure.subplots(1, max(len(curves), 1), squeeze=False)[0]

@@ -1,4 +1,4 @@
-"""Figures of a calibration and of a force documentation: SI, with inches and pounds beside."""
+"""Figures of a calibration and of a force documentation, in SI with a second scale in US units."""
 
 from __future__ import annotations
 
@@ -39,15 +39,15 @@ if TYPE_CHECKING:
     from coupled.calibration.result import CalibrationResult
 
 
-def _in_pounds(axes: Any) -> None:
-    """Give an axis of newtons one in pounds on its right."""
+def _add_pounds_axis(axes: Any) -> None:
+    """Add an axis in pounds on the right of an axis in newtons."""
     other = axes.secondary_yaxis("right", functions=(lambda x: x / POUND_N, lambda x: x * POUND_N))
     other.set_ylabel("lb", fontsize=8)
     other.tick_params(labelsize=7)
 
 
-def _in_inches(axes: Any) -> None:
-    """Give an axis of centimetres one in inches above it."""
+def _add_inches_axis(axes: Any) -> None:
+    """Add an axis in inches above an axis in centimetres."""
     factor = 100.0 * INCH_m
     other = axes.secondary_xaxis("top", functions=(lambda x: x / factor, lambda x: x * factor))
     other.set_xlabel("in", fontsize=8)
@@ -55,7 +55,7 @@ def _in_inches(axes: Any) -> None:
 
 
 def draw_forces(found: Documentation, system: System = "si") -> Figure:
-    """Draw force against true deflection at each q̄, swept both ways."""
+    """Draw force against true deflection at each q̄, for a sweep in both directions."""
     shown, newtons = deflection_shown(found.control, system), in_system("N", system)
     factor = shown.factor
     figure, grid = panels(1, len(found.conditions), 3.5)
@@ -77,9 +77,9 @@ def draw_forces(found: Documentation, system: System = "si") -> Figure:
         axes.set_xlabel(shown.labelled("true deflection δ"))
         axes.grid(alpha=0.25)
         if system == "si":
-            _in_pounds(axes)
+            _add_pounds_axis(axes)
         if shown.unit == "cm":
-            _in_inches(axes)
+            _add_inches_axis(axes)
     grid[0, 0].set_ylabel(newtons.labelled("force at the grip F"))
     figure.suptitle(title(found, "force against deflection, slow sweep both ways"), fontsize=12)
     with_legend(figure, grid[0, 0], 3)
@@ -87,7 +87,7 @@ def draw_forces(found: Documentation, system: System = "si") -> Figure:
 
 
 def draw_deflections(found: Documentation, system: System = "si") -> Figure:
-    """Draw computed against true deflection, and what the host's estimate lacks."""
+    """Draw computed against true deflection, and the error of the host's estimate."""
     shown = deflection_shown(found.control, system)
     factor = shown.factor
     travel = found.rig.controls[found.control].travel
@@ -129,7 +129,7 @@ def draw_deflections(found: Documentation, system: System = "si") -> Figure:
 
 
 def save_pages(figures: Sequence[Figure], path: Path) -> None:
-    """Write figures as the pages of one PDF, whole; the same figures give the same bytes."""
+    """Write figures as the pages of one PDF, atomically and with reproducible bytes."""
 
     def write(part: Path) -> None:
         with PdfPages(part, metadata={"CreationDate": None}) as pages:
@@ -147,7 +147,7 @@ def draw_pages(
     pdf: Path,
     system: System = "si",
 ) -> list[Path]:
-    """Draw each control's pages as PNG in a folder; the PDF has a cover and the checks before."""
+    """Draw the pages of each control as PNG files; the PDF begins with a cover and the checks."""
     pages: dict[Path, Figure] = {}
     numbers: dict[tuple[ControlName, Kind], int] = {}
     for found in documents:

@@ -1,4 +1,4 @@
-"""A force-deflection sweep of an aircraft: the readings with the fitted curve and friction."""
+"""A force-deflection sweep of an aircraft: readings, fitted curve and friction."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _POINTS = 400
 
 
 def draw_sweep(found: Feel, control: str, source: str, system: System = "si") -> Figure:
-    """Draw readings and fit over the deflection, and the residual, a row for each q̄."""
+    """Draw readings and fit over deflection, and the residual, one row for each q̄."""
     shown, newtons = deflection_shown(control, system), in_system("N", system)
     size = shown.factor
     figure, grid = panels(len(found.pressure), 2, 2.8)

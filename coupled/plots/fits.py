@@ -1,4 +1,4 @@
-"""A fitted nominal rig: each number over its filed value, with its 95 % interval."""
+"""A fitted nominal rig: the ratio of each fitted value to the filed value, with intervals."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def draw_fit(found: NominalFit) -> Figure:
-    """Draw each number as found over as filed; a number filed as 0, or undetermined, is named."""
+    """Draw fitted over filed values; a value filed as 0, or not determined, is listed as text."""
     shown = [one for one in found.numbers if one.filed != 0.0 and one.interval is not None]
     others = [one.key for one in found.numbers if one not in shown]
     figure = Figure(figsize=(8.2, 1.6 + 0.34 * max(len(shown), 2)), layout="constrained")

@@ -18,7 +18,7 @@ from coupled.authority.figures import (
     named,
     remarks,
 )
-from coupled.authority.held import true_deflection
+from coupled.authority.heldcontrol import true_deflection
 from coupled.display import Shown, System, in_system, parameter_label
 from coupled.errors import InputError, listed
 from coupled.plots.histories import legend_above, plain
@@ -42,19 +42,19 @@ _STYLE = {
     "compensated": ("#009e73", "solid", 1.6),
     "calibrated low": ("#e69f00", "dashdot", 1.6),
 }
-_IN_A_ROW, _WIDE = 6, 18  # names in a row of the legend, and letters of one that need more room
-_ONE_LINE = 0.01  # of the panel's span, within which curves are one line to the eye
-_MANY = 3  # curves that coincide
-_PALER = 0.45  # of a later case's curves, overlaid
-_LONGEST_END = 30  # letters of a flight's end
+_IN_A_ROW, _WIDE = 6, 18  # names in a row of the legend, and the length from which there are fewer
+_ONE_LINE = 0.01  # share of a panel's span within which curves count as coincident
+_MANY = 3  # least number of coincident curves that is noted
+_PALER = 0.45  # opacity of the curves of later cases when overlaid
+_LONGEST_END = 30  # characters of the reason of an early end
 _USUAL = Layout()
-_FELT = 0.01  # of the force: a step below that is felt by no hand
-_POINTS = 400  # of a specified force, whose corners are at any deflection
+_FELT = 0.01  # share of the force below which a force step cannot be felt
+_POINTS = 400  # samples of a specified force, which may have corners anywhere
 _SHORT = ("rigid", "uncomp.", "defl. only", "grad. only", "comp.", "cal. low")
 
 
 def panels_of(manoeuvre: Manoeuvre) -> list[str]:
-    """Return the panels that a comparison's figure may have."""
+    """Return the names of the panels that a comparison can have."""
     flown = manoeuvre.rig.flight is not None
     return ["surface", *(["motion"] if flown else []), "force", "loss"]
 
@@ -62,15 +62,15 @@ def panels_of(manoeuvre: Manoeuvre) -> list[str]:
 def draw_comparison(
     flights: Sequence[Flight], system: System = "si", layout: Layout = _USUAL
 ) -> Figure:
-    """Draw a comparison: a column a case; surface, motion, force, and what is lost.
+    """Draw a comparison with one column per case: surface, motion, force and authority lost.
 
-    Deflections and forces are in the units of a system. The layout may name some of `panels_of`,
-    and overlay the cases in the same axes, each paler than the one before.
+    Deflections and forces are in the units of `system`. `layout` may select some of `panels_of`,
+    and overlay the cases in the same axes, later cases paler.
 
-    Where each case is flown in one configuration only, and the hand feels the modifying force
-    step, draw a panel a case, of these steps, unless the layout names panels.
+    If each case has one configuration only, and the modifying force has steps that can be felt,
+    each case has one panel with these steps, unless `layout` names panels.
 
-    Raises InputError for a panel that is not there.
+    Raises InputError for an unknown panel.
     """
     cases = cases_of(flights)
     if flown_once(cases) and not layout.panels and not layout.overlay and _steps_are_felt(flights):
@@ -80,7 +80,7 @@ def draw_comparison(
     rows["force"] = partial(_draw_force, system=system)
     names = layout.chosen(panels_of(flights[0].manoeuvre))
     if layout.overlay and len(cases) > 1:
-        names = [name for name in names if name != "loss"]  # bars of several cases hide each other
+        names = [name for name in names if name != "loss"]  # bars of cases hide each other
         if not names:
             raise InputError("--overlay", "", "bars of several cases hide each other")
     columns = 1 if layout.overlay else len(cases)
@@ -97,7 +97,7 @@ def draw_comparison(
         if columns > 1:
             grid[0, i].set_title(_wrapped(case[0].outcome.case), fontsize=10)
     _share_limits(grid[-1])
-    # In print a caption explains; what is a guess stays marked.
+    # In print the caption explains the figure; only the note on assumed values stays.
     printed = layout.size_in is not None
     lines = [guessed(flights)] if printed else remarks(flights, system)
     lines = [*filter(None, lines), *_coincident(cases, names)]
@@ -119,7 +119,7 @@ def draw_comparison(
 
 
 def _panels(rows: int, columns: int, layout: Layout) -> tuple[Any, Figure]:
-    """Return axes by row and column, and their figure; the rows of a single column in a square."""
+    """Return axes by row and column, and their figure; a single column is laid out as a square."""
     across, down = (columns, rows) if columns > 1 else (min(2, rows), -(-rows // 2))
     width, height = layout.size(1.2 + 3.9 * across, 0.9 + 2.6 * down)
     if layout.size_in is not None and columns == 1 and height > width:
@@ -134,16 +134,16 @@ def _panels(rows: int, columns: int, layout: Layout) -> tuple[Any, Figure]:
 
 
 def _fade(lines: Sequence[Any], number: int) -> None:
-    """Draw the lines of a later case paler, without a name of their own."""
+    """Draw the lines of a later case paler and without a label."""
     for line in lines:
         line.set_alpha(_PALER**number)
         line.set_label("")
 
 
 def _coincident(cases: Sequence[Sequence[Flight]], names: Sequence[str]) -> list[str]:
-    """Return which configurations' curves lie on one another, a sentence a panel.
+    """Return one sentence per panel that names the configurations whose curves coincide.
 
-    Only three or more are named: of two, the dashed one shows the other.
+    Pairs are not named: the line styles show both.
     """
     said = []
     for name in names:
@@ -156,7 +156,7 @@ def _coincident(cases: Sequence[Sequence[Flight]], names: Sequence[str]) -> list
 
 
 def _same_curves(case: Sequence[Flight], panel: str) -> list[tuple[str, ...]]:
-    """Return the groups of three or more configurations with the same curve in a panel."""
+    """Return the groups of three or more configurations whose curves coincide in a panel."""
     if panel == "loss":
         return []
     groups: list[tuple[list[str], Any]] = []
@@ -174,7 +174,7 @@ def _same_curves(case: Sequence[Flight], panel: str) -> list[tuple[str, ...]]:
 
 
 def _curve(flight: Flight, panel: str) -> Any:
-    """Return what a panel draws of a flight over time, shape (channels, rows)."""
+    """Return the signals that a panel draws of a flight, shape (channels, rows)."""
     manoeuvre, record, control = flight.manoeuvre, flight.record, flight.manoeuvre.control
     if panel == "surface":
         return record[channel(control, "surface_norm")][None]
@@ -185,7 +185,7 @@ def _curve(flight: Flight, panel: str) -> Any:
 
 
 def _steps_are_felt(flights: Sequence[Flight]) -> bool:
-    """Tell whether the modifying force steps anywhere by more than a hundredth of the force."""
+    """Return whether a step of the modifying force anywhere exceeds 1 % of the force."""
     return any(f.outcome.force_step_N > _FELT * f.outcome.force_N for f in flights)
 
 
@@ -230,8 +230,8 @@ def _line(flight: Flight) -> dict[str, Any]:
     return {"color": color, "linestyle": style, "linewidth": width, "label": named(flight)}
 
 
-def _show_from_the_pull(axes: Any, case: Sequence[Flight]) -> None:
-    """Begin a time axis 3 s before the control moves, where it does so in the second half."""
+def _start_before_motion(axes: Any, case: Sequence[Flight]) -> None:
+    """Start the time axis 3 s before the control moves, if it moves in the second half only."""
     record, control = case[0].record, case[0].manoeuvre.control
     deflection = np.abs(record[channel(control, "deflection")])
     moves, end = record.time_s[np.argmax(deflection > 0.01 * np.max(deflection))], record.time_s[-1]
@@ -240,7 +240,7 @@ def _show_from_the_pull(axes: Any, case: Sequence[Flight]) -> None:
 
 
 def _draw_surface(axes: Any, case: Sequence[Flight]) -> None:
-    """Surface command about trim, against what the pilot's deflection asks for, and its stop."""
+    """Draw the surface command about trim, the command for the pilot's deflection, and the stop."""
     control = case[0].manoeuvre.control
     data = case[0].manoeuvre.rig.controls[control]
     sign = COMMAND_SIGN[data.surface]
@@ -259,12 +259,12 @@ def _draw_surface(axes: Any, case: Sequence[Flight]) -> None:
         label = f"{data.surface} at its stop"
         axes.axhline(100.0 * sign * stop, color="#cc0000", linestyle="dotted", label=label)
     axes.set_xlabel("time, s")
-    _show_from_the_pull(axes, case)
+    _start_before_motion(axes, case)
     axes.set_ylabel(f"{data.surface} command, % of travel")
 
 
 def _draw_motion(axes: Any, case: Sequence[Flight]) -> None:
-    """Pitch, roll or yaw rate, or the channel that the run wants drawn."""
+    """Draw the pitch, roll or yaw rate, or the channel that the run file selects."""
     drawn = case[0].manoeuvre.measure.drawn
     if drawn is not None:
         for flight in case:
@@ -279,12 +279,12 @@ def _draw_motion(axes: Any, case: Sequence[Flight]) -> None:
         axes.plot(flight.record.time_s, rate, **_line(flight))
     _mark_ends(axes, case, name, 1.0 / DEGREE_rad)
     axes.set_xlabel("time, s")
-    _show_from_the_pull(axes, case)
+    _start_before_motion(axes, case)
     axes.set_ylabel(f"{name.removesuffix('_rad_per_s').replace('_', ' ')}, °/s")
 
 
 def _mark_ends(axes: Any, case: Sequence[Flight], name: str, factor: float = 1.0) -> None:
-    """Put a cross where a flight ended before its time, and each reason once."""
+    """Mark the early ends of flights with a cross, and write each reason once."""
     reasons: dict[str, tuple[float, float]] = {}
     for flight in case:
         if flight.ended_early:
@@ -299,7 +299,7 @@ def _mark_ends(axes: Any, case: Sequence[Flight], name: str, factor: float = 1.0
 
 
 def _draw_force(axes: Any, case: Sequence[Flight], system: System) -> None:
-    """Force against true deflection, with what was specified."""
+    """Draw force against true deflection, with the specified force."""
     control = case[0].manoeuvre.control
     shown, newtons = deflection_shown(control, system), in_system("N", system)
     for flight in case:
@@ -319,7 +319,7 @@ def _draw_force(axes: Any, case: Sequence[Flight], system: System) -> None:
 
 
 def _draw_loss(axes: Any, case: Sequence[Flight]) -> None:
-    """Draw authority lost and felt force missing in each configuration."""
+    """Draw the authority lost and the missing force of each configuration."""
     outcomes = [flight.outcome for flight in case]
     places = np.arange(len(outcomes))
     lost = [100.0 * o.loss for o in outcomes]
@@ -355,7 +355,7 @@ def _draw_loss(axes: Any, case: Sequence[Flight]) -> None:
 
 
 def _draw_steps(axes: Any, case: Sequence[Flight], unit: Shown) -> None:
-    """Jumps of the modifying force from frame to frame, which the hand feels."""
+    """Draw the steps of the modifying force from frame to frame."""
     flight = case[0]
     step = unit.factor * flight.record[channel(flight.manoeuvre.control, "force_step")]
     axes.vlines(flight.record.time_s, 0.0, step, color="#d55e00", linewidth=0.8)

@@ -1,4 +1,4 @@
-"""The figures of a diagnosis: the ladder, the chain of stages, the effect's signature, curves."""
+"""The figures of a diagnosis: ladder, stages, signatures and curves."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ FIGURES = {
     "stages.png": draw_stages,
     "signature.png": draw_signature,
 }
-CURVES = "curves.png"  # drawn only if there are any
+CURVES = "curves.png"  # drawn only if the diagnosis has curves
 
 
-def drawn_parts(diagnosis: Diagnosis, system: System = "si") -> dict[str, dict[str, Figure]]:
-    """Draw the parts with a gap, or all if none has one: figures by their names, by part."""
+def draw_parts(diagnosis: Diagnosis, system: System = "si") -> dict[str, dict[str, Figure]]:
+    """Return the figures of each part with a gap, or of all parts if none has one, by file name."""
 
     def drawn(part: PartDiagnosis) -> dict[str, Figure]:
         figures = FIGURES | ({CURVES: draw_curves} if part.curves else {})
@@ -33,29 +33,29 @@ def drawn_parts(diagnosis: Diagnosis, system: System = "si") -> dict[str, dict[s
 
 
 def draw_diagnosis(diagnosis: Diagnosis, system: System = "si") -> dict[str, Figure]:
-    """Draw a diagnosis in the units of a system: the figures by their files' names.
+    """Draw a diagnosis in the units of `system`: the figures by file name.
 
-    Of several controls the names start with the part: `column-ladder.png`, `airframe-stages.png`.
+    With several controls the names begin with the part: `column-ladder.png`, `airframe-stages.png`.
     """
     several = len(diagnosis.parts) > 1
     return {
-        file_of(name, part if several else ""): figure
-        for part, drawn in drawn_parts(diagnosis, system).items()
+        figure_file(name, part if several else ""): figure
+        for part, drawn in draw_parts(diagnosis, system).items()
         for name, figure in drawn.items()
     }
 
 
 def figure_files(parts: Iterable[str]) -> list[str]:
-    """Return the names of the files that figures of parts may have, "" for the only one."""
-    return [file_of(name, part) for part in parts for name in (*FIGURES, CURVES)]
+    """Return the file names that the figures of parts can have; the only part is ""."""
+    return [figure_file(name, part) for part in parts for name in (*FIGURES, CURVES)]
 
 
-def file_of(name: str, part: str) -> str:
-    """Return the name of the file of a part's figure."""
+def figure_file(name: str, part: str) -> str:
+    """Return the file name of a figure of a part."""
     return f"{part}-{name}" if part else name
 
 
 def shown_parts(diagnosis: Diagnosis) -> list[PartDiagnosis]:
-    """Return the parts of a diagnosis that have a gap, or all if none has one."""
+    """Return the parts of a diagnosis that have a gap, or all parts if none has one."""
     parts = [part for part in diagnosis.parts if part.verdict != "no_gap"]
     return parts or list(diagnosis.parts)

@@ -1,4 +1,4 @@
-"""What the figures of a gap share: their colours, their units, and the rigs between the rungs."""
+"""Shared by the figures of a diagnosis: colours, units, and the rigs of each search depth."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from coupled.record.channels import CONTROL_NAMES
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
 
-# Okabe and Ito's colours, as in the other figures: what is wrong is vermilion, what is right green.
+# Colours of Okabe and Ito, as in the other figures: vermilion before the fit, green after it.
 MEASURED, WRONG, RIGHT, RIVAL = "black", "#d55e00", "#009e73", "#0072b2"
 FAINT, SHADE = "0.6", "#e4ecf4"
 _LABELS = {
@@ -47,12 +47,12 @@ _LABELS = {
 
 
 def channel_shown(name: str, system: System = "si", fine: bool = False) -> Shown:
-    """Return a channel's words, and the unit in which it is drawn; `fine` for a residual, in mm."""
+    """Return the words and the drawn unit of a channel; `fine` for a residual, in mm."""
     return replace(drawn(name, system, fine), words=channel_label(name))
 
 
 def channel_label(name: str) -> str:
-    """Return a channel's label in a figure, with its symbol."""
+    """Return the label of a channel in a figure, with its symbol."""
     first, rest = name.split("_", 1)
     bare = rest if first in CONTROL_NAMES else name
     for start in sorted(_LABELS, key=len, reverse=True):
@@ -62,7 +62,7 @@ def channel_label(name: str) -> str:
 
 
 def style_of(kind: str) -> dict[str, Any]:
-    """Return how a line is drawn: measured, wrong (before), right (after) or rival."""
+    """Return the line style of a kind: measured, wrong (before), right (after) or rival."""
     styles: dict[str, dict[str, Any]] = {
         "measured": {"color": "0.7", "linewidth": 4.5, "zorder": 1.5},
         "wrong": {"color": WRONG, "linewidth": 1.4, "linestyle": "dashed"},
@@ -74,28 +74,28 @@ def style_of(kind: str) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class View:
-    """A diagnosis and its records, as the figures ask for it, and the units that they have."""
+    """A diagnosis, its records, and the system of units in which it is drawn."""
 
     diagnosis: PartDiagnosis
     system: System = "si"
 
     @property
     def records(self) -> tuple[Record, ...]:
-        """The records, in their order."""
+        """The records, in order."""
         return tuple(self.diagnosis.records.values())
 
     @property
     def stages(self) -> dict[str, StageResult]:
-        """What was found at each stage, by its name."""
+        """The result of each stage, by name."""
         return {stage.name: stage for stage in self.diagnosis.stages}
 
     @property
     def effects(self) -> tuple[Effect, ...]:
-        """The effects found, in the order in which they were."""
+        """The effects found, in the order of the search."""
         return tuple(step.effect for step in self.diagnosis.choice.steps)
 
     def rig_with(self, effects: Sequence[Effect]) -> Rig:
-        """Return the rig with some of the effects found, at the sizes of the final fit."""
+        """Return the nominal rig with some of the effects, at the values of the final fit."""
         whole = self.diagnosis
         if not effects:
             return whole.nominal
@@ -104,21 +104,21 @@ class View:
         return whole.rig_with(effects)
 
     def rungs(self) -> list[tuple[str, Rig]]:
-        """Return the rigs from the nominal one to the improved, an effect more at a time."""
+        """Return the rigs from nominal to improved, with one more effect each, and their labels."""
         found = [("nominal", self.diagnosis.nominal)]
         for k, effect in enumerate(self.effects):
             found.append((f"+ {plain(effect.name)}", self.rig_with(self.effects[: k + 1])))
         return found
 
     def threshold(self, stage: str) -> float:
-        """Return the gap up to which a stage counts as explained."""
+        """Return the normalised residual up to which a stage counts as explained."""
         found = self.stages.get(stage)
         return FAULTY_FROM if found is None else found.explained_below
 
     def suspects(self) -> list[Output]:
-        """Return the outputs of guilty stages and of the effects found, widest gap first.
+        """Return the outputs of faulty stages and of the effects found, by falling residual.
 
-        Those within their floor are left out, unless all are.
+        Outputs within their noise floor are omitted, unless all are.
         """
         guilty = set(self.diagnosis.guilty)
         for effect in self.effects:
@@ -134,15 +134,15 @@ class View:
         return output.gap(self.diagnosis.improved)
 
     def readers(self, rig: Rig) -> list[Reading]:
-        """Return what reads the stages' inputs off each record."""
+        """Return the `Reading` of each record, which computes the inputs of the stages."""
         return [reader.under(rig) for reader in self.diagnosis.readers]
 
     def time(self, output: Output) -> Floats:
-        """Return the time of an output's frames, in s from the record's start."""
+        """Return the times of the frames of an output, in s from the start of the record."""
         time = self.records[output.record].time_s
         return np.asarray(time - time[0])
 
     def source(self, output: Output) -> str:
-        """Return the file that an output is of, where there are several."""
+        """Return the record file of an output as a suffix, or "" for a single record."""
         files = tuple(self.diagnosis.records)
         return "" if len(files) < 2 else f" ({files[output.record]})"

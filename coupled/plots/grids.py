@@ -1,4 +1,4 @@
-"""A sweep on a grid of two parameters: lines labelled by the other's value, or a map."""
+"""The figure of a sweep over a grid of two parameters: lines, or a map."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from coupled.display import System, parameter_label
 from coupled.errors import InputError
 from coupled.plots.histories import plain
 from coupled.plots.layout import Layout
-from coupled.plots.sweepview import in_unit, is_logarithmic, mark_ended, place_of, titled
+from coupled.plots.sweepview import full_title, in_unit, is_logarithmic, label_x, mark_ended
 
 Dashes = Literal["-", "--", ":", "-."]
 _MOST_LINES = 8
@@ -27,7 +27,7 @@ _MARKS = "os^Dv<>p"
 
 
 def is_grid(found: pl.DataFrame, keys: Sequence[str], numeric: Sequence[str]) -> bool:
-    """Tell whether a sweep flew each value of one parameter with each of another, and no more."""
+    """Return whether a sweep is a full grid over exactly two parameters."""
     if len(numeric) != 2 or list(keys) != list(numeric):
         return False
     counts = [found[key].n_unique() for key in numeric]
@@ -43,10 +43,11 @@ def draw_grid(
     system: System = "si",
     layout: Layout = _USUAL,
 ) -> Figure:
-    """Draw a row a figure, a column a configuration; the longer parameter along the bottom.
+    """Draw one row per figure of merit and one column per configuration.
 
-    `heading` is the title, and a remark below it. Overlaid, configurations are styles of lines in
-    one column. Raises InputError for maps overlaid.
+    The parameter with more values is on the x axis. `heading` is the title and a remark below it.
+    With an overlay, configurations are line styles in one column. Raises InputError for overlaid
+    maps.
     """
     along, other = sorted(keys, key=lambda key: -found[key].n_unique())
     configurations = found["configuration"].unique(maintain_order=True).to_list()
@@ -57,7 +58,7 @@ def draw_grid(
     size = layout.size(max(1.6 + 3.1 * columns, 6.0), 1.5 + 2.4 * len(figures))
     drawn = Figure(figsize=size, layout="constrained")
     ended = not as_lines and bool((found["ended_early"] != "").any())
-    title = titled(*heading, size[0])
+    title = full_title(*heading, size[0])
     drawn.suptitle(f"{title}\ngray: ended early" if ended else title, fontsize=11)
     panels = drawn.subplots(len(figures), columns, squeeze=False, sharex=True, sharey="row")
     for row, name in zip(panels, figures, strict=True):
@@ -76,10 +77,10 @@ def draw_grid(
     for axes, configuration in zip(panels[0], titles, strict=True):
         axes.set_title("" if configuration == AS_FILED else plain(configuration), fontsize=10)
     for axes in panels[-1]:
-        place_of(axes, along, found[along])
+        label_x(axes, along, found[along])
     if as_lines:
         handles, labels = panels[0, 0].get_legend_handles_labels()
-        named = dict(zip(reversed(labels), reversed(handles), strict=True))  # of the first style
+        named = dict(zip(reversed(labels), reversed(handles), strict=True))
         labels = list(dict.fromkeys(labels))
         handles = [named[label] for label in labels]
         if layout.overlay:
@@ -121,9 +122,9 @@ def _draw_maps(
     keys: tuple[str, str],
     figure: tuple[str, str],
 ) -> None:
-    """Draw a map a configuration, all of a row in the same colours; gray where none was flown.
+    """Draw one map per configuration with a common colour scale; gray where no flight is.
 
-    `figure` is the figure's column, and its label.
+    `figure` is the column of the figure of merit and its label.
     """
     (along, other), (name, label) = keys, figure
     flown = found.with_columns(

@@ -1,4 +1,4 @@
-"""Time histories, drawn. All that is known of a record here is its channels: it may call this."""
+"""Time histories of channels. `Record.plot` uses this module, so it does not import `Record`."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from coupled.units import DEGREE_rad
 
 __all__ = ["Figure", "Histories", "draw_channels", "draw_record", "plain"]
 
-STILL = 1e-3  # of the widest line in a panel: what moves less is not drawn
-Line = tuple[str, str, float]  # a channel, its name in the legend, and the factor to its unit
+STILL = 1e-3  # of the largest line in a panel: smaller lines are not drawn
+Line = tuple[str, str, float]  # channel, name in the legend, factor to the drawn unit
 
 
 class Histories(Protocol):
-    """Channels over time: what is drawn of a record."""
+    """Channels over time."""
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """The channels' names."""
+        """The names of the channels."""
 
     @property
     def time_s(self) -> NDArray[np.float64]:
-        """Time of each row."""
+        """The time of each row."""
 
     def __getitem__(self, channel: str, /) -> NDArray[np.float64]: ...
 
@@ -38,7 +38,7 @@ _DEGREES = 1.0 / DEGREE_rad
 
 
 def draw_channels(record: Histories, channels: Sequence[str], title: str = "") -> Figure:
-    """Draw some channels, one below the other, each in the unit of figures: cm, °, kPa."""
+    """Draw channels one below the other, in the units of figures: cm, °, kPa."""
     for name in channels:
         if name not in record.channels:
             raise InputError("record", name, f"no such channel; {nearest(name, record.channels)}")
@@ -51,9 +51,9 @@ def draw_channels(record: Histories, channels: Sequence[str], title: str = "") -
 
 
 def draw_record(record: Histories, title: str = "") -> Figure:
-    """Draw a record: the force and deflections of each control that moves, surfaces, motion.
+    """Draw a record: force and deflections of each control that moves, surfaces, and motion.
 
-    What stays at rest beside something that moves is named and not drawn.
+    Constant channels are listed and not drawn, unless all channels are constant.
     """
     panels: list[tuple[str, list[Line]]] = []
     controls = [name for name in CONTROL_NAMES if control_channels(name)[0] in record.channels]
@@ -91,7 +91,7 @@ def draw_record(record: Histories, title: str = "") -> Figure:
 
 
 def _moves(record: Histories, control: str) -> bool:
-    """Tell whether a control has a force or a deflection at any time."""
+    """Return whether a control has a nonzero force or deflection."""
     names = [control_channels(control)[0], channel(control, "deflection")]
     return any(np.any(record[name]) for name in names if name in record.channels)
 
@@ -133,12 +133,12 @@ def _drawn(
 
 
 def plain(text: str) -> str:
-    """Return a user's text as text, where a dollar sign would begin a formula."""
+    """Return a user's text with dollar signs escaped, since matplotlib reads them as formulas."""
     return text.replace("$", r"\$")
 
 
 def legend_above(axes: Any, columns: int, fontsize: float = 7.0) -> None:
-    """Put a legend above a panel without a title, where it covers no curve."""
+    """Put a legend above a panel that has no title, where it covers no curve."""
     axes.legend(
         loc="lower right",
         bbox_to_anchor=(1.0, 0.99),

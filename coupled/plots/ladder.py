@@ -1,4 +1,4 @@
-"""The ladder of a diagnosis: what each depth of the search gained, and the gap rung by rung."""
+"""The ladder of a diagnosis: gains at each search depth, and the residual after each effect."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from coupled.plots.gapview import View
 
 _COLORS = {stage.name: stage.color for stage in CHAIN}
 _LINEAR = 10.0  # gain up to which the axis is linear
-_ROOM = 12.0  # beyond the bars, for their numbers
-_HALF = 0.38  # of a rung's width
+_ROOM = 12.0  # space beyond the bars for their numbers
+_HALF = 0.38  # half of the width of a step
 _WIDE = 62  # characters of a headline
 Gaps = list[dict[str, float]]
 
 
 def draw_ladder(view: View) -> Figure:
-    """Draw the gains of every effect tried, the gap from rung to rung, and what was found."""
+    """Draw the gain of each effect tried, the residual after each step, and the values found."""
     rounds = [gains for gains in view.diagnosis.choice.rounds if gains]
     gaps = _all_gaps(view)
     heights = [len(gains) + 1.6 for gains in rounds] or [4.0]
@@ -42,7 +42,7 @@ def draw_ladder(view: View) -> Figure:
             _draw_round(axes, view, k, rounds, gaps)
         _finish_gains(left, grid[:, 0], rounds)
     else:
-        _say(left.subplots(), "No stage exceeds its noise floor:\nno effect was fitted.")
+        _write_text(left.subplots(), "No stage exceeds its noise floor:\nno effect was fitted.")
     rungs, table = right.subplots(2, 1, height_ratios=[3.0, max(1.0, 0.3 * (len(numbers) + 1))])
     _draw_rungs(rungs, view, gaps)
     _draw_numbers(table, numbers)
@@ -52,7 +52,7 @@ def draw_ladder(view: View) -> Figure:
 
 
 def _all_gaps(view: View) -> Gaps:
-    """Return the stages' gaps rung by rung; at the last as the diagnosis has what is left."""
+    """Return the residuals of the stages after each step; the last are those of the diagnosis."""
     gaps = [_gaps(view, rig) for _, rig in view.rungs()]
     if view.effects:
         left = {s.name: s.left for s in view.diagnosis.stages if s.left is not None}
@@ -61,7 +61,7 @@ def _all_gaps(view: View) -> Gaps:
 
 
 def _gaps(view: View, rig: Any) -> dict[str, float]:
-    """Return each stage's gap with a rig."""
+    """Return the normalised residual of each stage with a rig."""
     found: dict[str, float] = {}
     for output, gap in stage_gaps(view.diagnosis.outputs, rig).items():
         stage = stage_of(output)
@@ -69,8 +69,8 @@ def _gaps(view: View, rig: Any) -> dict[str, float]:
     return found
 
 
-def _winner(view: View, k: int, rounds: list[dict[str, float]]) -> Found | None:
-    """Return the step that a round gave, if any: a step found since in no later round."""
+def _accepted_effect(view: View, k: int, rounds: list[dict[str, float]]) -> Found | None:
+    """Return the effect accepted at a depth, if it is not in a later round."""
     later = {name for gains in rounds[k + 1 :] for name in gains}
     least = max(0.0, max(rounds[k].values()) - RIVAL_GAIN)
     for step in view.diagnosis.choice.steps:
@@ -82,7 +82,7 @@ def _winner(view: View, k: int, rounds: list[dict[str, float]]) -> Found | None:
 
 def _draw_round(axes: Any, view: View, k: int, rounds: list[dict[str, float]], gaps: Gaps) -> None:
     gains = sorted(rounds[k].items(), key=lambda item: item[1])
-    step = _winner(view, k, rounds)
+    step = _accepted_effect(view, k, rounds)
     rivals = {rival.effect.name for rival in step.rivals} if step else set()
     for place, (name, gain) in enumerate(gains):
         found = step is not None and name == step.effect.name
@@ -104,7 +104,7 @@ def _draw_round(axes: Any, view: View, k: int, rounds: list[dict[str, float]], g
 
 def _headline(k: int, step: Found | None) -> str:
     if step is None:
-        return f"depth {k + 1}: nothing gains"
+        return f"depth {k + 1}: no effect gains"
     rivals = ", ".join(dict.fromkeys(plain(rival.effect.name) for rival in step.rivals))
     doubt = f" (rivals: {rivals})" if rivals else ""
     return textwrap.fill(f"depth {k + 1}: {plain(step.effect.name)}{doubt}", _WIDE)
@@ -126,14 +126,14 @@ def _write_gain(axes: Any, place: int, gain: float, weight: str) -> None:
 
 
 def _short(gain: float) -> str:
-    """Return a gain without an exponent: a tenth of it is nothing."""
+    """Return a gain without an exponent, rounded to a tenth."""
     if abs(gain) < 1000.0:
         return "0" if abs(gain) < 0.05 else f"{gain:.3g}"
     return f"{gain:.0f}"
 
 
 def _finish_gains(figure: Any, column: Any, rounds: list[dict[str, float]]) -> None:
-    """Set the shared axis, with room for the numbers at the bars' ends, and the legend."""
+    """Set the shared axis with space for the numbers, and the legend."""
     every = [gain for gains in rounds for gain in gains.values()]
     last = column[-1]
     last.set_xscale("symlog", linthresh=_LINEAR, linscale=0.8)
@@ -162,7 +162,7 @@ def _bar(axes: Any, style: dict[str, Any], label: str) -> Any:
 
 
 def _screened(view: View, tried: dict[str, float], gaps: dict[str, float]) -> list[str]:
-    """Return the effects of the stages then guilty that were not worth a fit, or hit a bound."""
+    """Return the effects of the then faulty stages that were screened out or hit a bound."""
     guilty = {stage for stage, gap in gaps.items() if gap > view.threshold(stage)}
     known = {effect.name for effect in view.effects}
     return [
@@ -176,7 +176,7 @@ def _screened(view: View, tried: dict[str, float], gaps: dict[str, float]) -> li
 
 
 def _draw_rungs(axes: Any, view: View, gaps: Gaps) -> None:
-    """Draw each suspect stage's gap from the nominal rig down to the improved one."""
+    """Draw the normalised residual of each suspected stage from the nominal to the improved rig."""
     names = [name for name, _ in view.rungs()]
     suspects = {stage_of(output.stage) for output in view.suspects()}
     stages = [stage for stage in _COLORS if stage in suspects and stage in gaps[0]]
@@ -191,7 +191,7 @@ def _draw_rungs(axes: Any, view: View, gaps: Gaps) -> None:
             axes.annotate(
                 f"{gap:.3g}",
                 (place, gap),
-                (0, 4 if gap >= 1.0 else -4),  # clear of the floor's own line
+                (0, 4 if gap >= 1.0 else -4),  # away from the line of the noise floor
                 textcoords="offset points",
                 ha="center",
                 va="bottom" if gap >= 1.0 else "top",
@@ -228,7 +228,7 @@ def _draw_rungs(axes: Any, view: View, gaps: Gaps) -> None:
     axes.set_xticks(places, ["\n".join(textwrap.wrap(name, 16)) for name in names], fontsize=8)
     axes.set_ylabel("residual over its noise floor, 1 (logarithmic)", fontsize=9)
     axes.set_title(
-        "gap from rung to rung\n(black: floor of noise; dotted: explained below it)",
+        "residual after each effect\n(black: noise floor; dotted: explained below it)",
         fontsize=9,
         loc="left",
     )
@@ -244,7 +244,7 @@ def _draw_rungs(axes: Any, view: View, gaps: Gaps) -> None:
 
 
 def _numbers(view: View) -> list[tuple[str, str, str]]:
-    """Return a line an effect, and one a parameter: its name, its value, its 95 % interval."""
+    """Return one line per effect and per parameter: name, value, 95 % interval."""
     lines = []
     for effect in view.diagnosis.effects:
         lines.append((f"{plain(effect.name)}, p = {effect.probability:.2f}", "", ""))
@@ -259,7 +259,7 @@ def _numbers(view: View) -> list[tuple[str, str, str]]:
 
 def _draw_numbers(axes: Any, lines: list[tuple[str, str, str]]) -> None:
     if not lines:
-        _say(axes, "No effect found.")
+        _write_text(axes, "No effect found.")
         return
     axes.set_axis_off()
     heads = ("effect", "value", "95 % interval")
@@ -281,6 +281,6 @@ def _draw_numbers(axes: Any, lines: list[tuple[str, str, str]]) -> None:
             cell.set_text_props(fontweight="bold")
 
 
-def _say(axes: Any, text: str) -> None:
+def _write_text(axes: Any, text: str) -> None:
     axes.set_axis_off()
     axes.text(0.5, 0.5, text, ha="center", va="center", transform=axes.transAxes, fontsize=10)

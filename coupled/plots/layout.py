@@ -1,4 +1,4 @@
-"""How a figure is laid out for print: which panels, overlaid or side by side, at which size."""
+"""The layout of a figure for print: which panels, overlaid or side by side, and the size."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ from coupled.units import INCH_m
 _INCHES = {"cm": 0.01 / INCH_m, "mm": 0.001 / INCH_m, "in": 1.0}
 _LEAST_in, _MOST_in = 1.0, 100.0
 _PRINT_dpi = 300
-_LARGEST_pt, _SMALLEST_pt, _LETTER = 7.5, 6.0, 0.53  # of print; a letter's width, of its height
+_LARGEST_pt, _SMALLEST_pt, _LETTER = 7.5, 6.0, 0.53  # mean width of a letter over its size
 _PAD_in = 0.02
 _POINTS_per_inch = 72.0
-_THINNEST_pt = 0.6  # of a line
+_THINNEST_pt = 0.6  # least line width
 _SIZE = re.compile(r"\s*([0-9.]+)\s*[x×]\s*([0-9.]+)\s*(cm|mm|in)\s*")
 
 
 @dataclass(frozen=True)
 class Layout:
-    """Which panels a figure has (all: none named), whether its curves share axes, and its size.
+    """The selected panels of a figure (empty: all), whether cases are overlaid, and the size.
 
-    `size_in` is width and height in inches, None for a size that goes with the panels.
+    `size_in` is width and height in inches, or None for a size that fits the panels.
     """
 
     panels: tuple[str, ...] = ()
@@ -40,7 +40,7 @@ class Layout:
     size_in: tuple[float, float] | None = None
 
     def chosen(self, there: Iterable[str]) -> list[str]:
-        """Return the panels named, or all. Raises InputError for one that is not there."""
+        """Return the selected panels, or all. Raises InputError for an unknown panel."""
         known = list(there)
         for name in self.panels:
             if name not in known:
@@ -48,14 +48,14 @@ class Layout:
         return list(dict.fromkeys(self.panels)) or known
 
     def size(self, width_in: float, height_in: float) -> tuple[float, float]:
-        """Return the requested size, or by default one that fits the panels, in inches."""
+        """Return the requested size in inches, or else the default given."""
         return self.size_in or (width_in, height_in)
 
 
 def layout_of(panels: str = "", overlay: bool = False, size: str = "") -> Layout:
-    """Return a layout from words: `panels` with commas between them, `size` as 8.5x6cm.
+    """Return a layout from text: `panels` separated by commas, `size` as 8.5x6cm.
 
-    Raises InputError for a size without a unit, or one that is no figure's.
+    Raises InputError for a size without a unit or outside the limits.
     """
     names = tuple(word.strip() for word in panels.split(",") if word.strip())
     if not size:
@@ -74,15 +74,15 @@ def layout_of(panels: str = "", overlay: bool = False, size: str = "") -> Layout
 
 
 def for_print(figure: Figure, layout: Layout) -> Figure:
-    """Return a figure with letters and lines for the requested size; unchanged without a size.
+    """Set fonts and lines for the requested size; without a size the figure stays unchanged.
 
-    Letters have 6 to 7.5 points, PNG files 300 dots an inch.
+    Fonts have 6 to 7.5 points, PNG files 300 dots per inch.
     """
     if layout.size_in is None:
         return figure
     figure.set_dpi(_PRINT_dpi)
     width, height = layout.size_in
-    scale = min(1.0, math.sqrt(width * height / 40.0))  # of 8 by 5 inches
+    scale = min(1.0, math.sqrt(width * height / 40.0))  # relative to 8 by 5 inches
     for text in figure.findobj(Text):
         assert isinstance(text, Text)
         text.set_fontsize(min(_LARGEST_pt, max(_SMALLEST_pt, scale * float(text.get_fontsize()))))
@@ -102,34 +102,34 @@ def for_print(figure: Figure, layout: Layout) -> Figure:
         engine.set(w_pad=_PAD_in, h_pad=_PAD_in)
     title = figure.get_suptitle()
     if title:
-        figure.suptitle(_within(title.split("\n"), width, _SMALLEST_pt), fontsize=_SMALLEST_pt)
+        figure.suptitle(_wrap_lines(title.split("\n"), width, _SMALLEST_pt), fontsize=_SMALLEST_pt)
     for legend in list(figure.legends):
         _fit(figure, legend, width)
     return figure
 
 
 def _break_labels(axes: Axes, width_in: float, height_in: float) -> None:
-    """Break the title and labels of axes where they are longer than the axes."""
+    """Wrap the title and labels of axes that are longer than the axes."""
     place = axes.get_subplotspec()
     if place is None:
         return
     rows, columns = place.get_gridspec().nrows, place.get_gridspec().ncols
-    across = (width_in - 0.3) / columns - 0.25  # beside labels and ticks
+    across = (width_in - 0.3) / columns - 0.25  # without labels and ticks
     up = (height_in - 0.6) / rows - 0.3
     for text, room in ((axes.title, across), (axes.xaxis.label, across), (axes.yaxis.label, up)):
         words = [text.get_text().replace("\n", " ")] if text.get_text() else []
-        text.set_text(_within(words, max(room, 0.4), float(text.get_fontsize())))
+        text.set_text(_wrap_lines(words, max(room, 0.4), float(text.get_fontsize())))
         text.set_linespacing(1.0)
 
 
-def _within(lines: Sequence[str], width_in: float, size_pt: float) -> str:
-    """Return lines, broken where they are wider than a figure."""
+def _wrap_lines(lines: Sequence[str], width_in: float, size_pt: float) -> str:
+    """Return lines, wrapped to the width of a figure."""
     letters = max(5, int(width_in * _POINTS_per_inch / (_LETTER * size_pt)))
     return "\n".join(part for line in lines for part in textwrap.wrap(line, letters))
 
 
 def _fit(figure: Figure, legend: Legend, width_in: float) -> None:
-    """Put a figure's legend below it anew, in as many columns as its width has room for."""
+    """Move the legend below the figure, with as many columns as its width has room for."""
     labels = [text.get_text() for text in legend.get_texts()]
     if not labels:
         return

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from coupled.authority.maps import Feel, Floats, LossMap
 
 _NO_LOSS = 5e-4  # a share that rounds to 0.0 %
-_NEUTRAL = 0.1  # of the greatest deflection flown, below which a control is near neutral
-_GAINS_percent = 0.5  # below zero, from where colours have two signs
+_NEUTRAL = 0.1  # share of the greatest deflection flown below which a control is near neutral
+_GAINS_percent = 0.5  # least gain for which the colour scale has two signs
 _LETTERS_per_inch = 13.0  # of a title
 _STYLES = {
     "rigid": ("specified", GRAY, "solid", 4.5),
@@ -37,10 +37,10 @@ def draw_losses(
     flown: Mapping[ControlName, Floats],
     system: System = "si",
 ) -> Figure:
-    """Draw the loss of each control (rows) in each configuration (columns).
+    """Draw the authority loss of each control (rows) in each configuration (columns).
 
-    The colours of a row go as far as the losses in what was flown, of all deflections without
-    flights. A map without any loss is not drawn: the title names it.
+    The colour scale of a row covers the losses within the flown range, or at all deflections if
+    nothing was flown. A map without any loss is not drawn but named in the title.
     """
     drawn = {control: [m for m in of_control if _loses(m)] for control, of_control in maps.items()}
     drawn = {control: kept for control, kept in drawn.items() if kept}
@@ -55,7 +55,7 @@ def draw_losses(
         ours = [(places[loss_map.configuration], loss_map) for loss_map in of_control]
         _draw_row(figure, ours, flown[control], system)
     outlined = "line: what was flown" if any(f.size for f in flown.values()) else ""
-    notes = "; ".join(filter(None, (_grey(drawn), outlined)))
+    notes = "; ".join(filter(None, (_grey_note(drawn), outlined)))
     title = f"{name}: deflection lost on the way to the surface" + (f" ({notes})" if notes else "")
     lines = [title, *_without_loss(maps)]
     letters = int(_LETTERS_per_inch * figure.get_size_inches()[0])
@@ -65,13 +65,13 @@ def draw_losses(
 
 
 def _loses(loss_map: LossMap) -> bool:
-    """Tell whether anything is lost or gained anywhere in a map."""
+    """Return whether a map has any loss or gain."""
     there = loss_map.loss[np.isfinite(loss_map.loss)]
     return bool(np.any(np.abs(there) > _NO_LOSS))
 
 
 def _without_loss(maps: Mapping[ControlName, Sequence[LossMap]]) -> list[str]:
-    """Return the sentences on maps that are not drawn: where nothing is lost, or nothing moves."""
+    """Return sentences on the maps that are not drawn: no loss, or no motion."""
     found: dict[str, list[str]] = {}
     for control, of_control in maps.items():
         for loss_map in of_control:
@@ -84,19 +84,19 @@ def _without_loss(maps: Mapping[ControlName, Sequence[LossMap]]) -> list[str]:
         why, _, name = place.partition(" on the ")
         alike.setdefault((why, tuple(configurations)), []).append(name)
     return [
-        f"{why} on {_in_a_row(controls)}, {_in_a_row(configurations)}."
+        f"{why} on {_join_with_and(controls)}, {_join_with_and(configurations)}."
         for (why, configurations), controls in alike.items()
     ]
 
 
-def _in_a_row(words: Sequence[str]) -> str:
+def _join_with_and(words: Sequence[str]) -> str:
     return " and ".join(filter(None, (", ".join(words[:-1]), words[-1])))
 
 
 def _draw_row(
     figure: Figure, ours: Sequence[tuple[Axes, LossMap]], flown: Floats, system: System
 ) -> None:
-    """Draw the maps of a control, in the same colours."""
+    """Draw the maps of a control with a common colour scale."""
     pressure = pressure_shown(system)
     deflection = deflection_shown(ours[0][1].control, system)
     least, most = _range(ours, flown)
@@ -112,7 +112,7 @@ def _draw_row(
             shading="gouraud",
         )
         _outline(axes, flown, (pressure.factor, deflection.factor))
-        axes.set_facecolor(GRAY)  # no loss: the loader rests, or the grip does not go so far
+        axes.set_facecolor(GRAY)  # the loader rests, or the grip cannot get there
         axes.set_ylim(0.0, deflection.factor * loss_map.deflection[-1])
         axes.set_title(f"{loss_map.control}, {loss_map.configuration}", fontsize=10)
         axes.set_xlabel(pressure.labelled("dynamic pressure q̄"))
@@ -123,9 +123,9 @@ def _draw_row(
 
 
 def _range(ours: Sequence[tuple[Axes, LossMap]], flown: Floats) -> tuple[float, float]:
-    """Return the ends of a row's colours, in %: the losses where it was flown.
+    """Return the ends of the colour scale of a row, in %: the losses within the flown range.
 
-    Those near neutral are beyond: there a breakout is a large share of a small deflection.
+    Deflections near neutral are excluded: a breakout is a large share of a small deflection.
     """
     found = np.concatenate([_flown_losses(loss_map, flown) for _, loss_map in ours])
     if not found.size:
@@ -136,9 +136,9 @@ def _range(ours: Sequence[tuple[Axes, LossMap]], flown: Floats) -> tuple[float, 
 
 
 def _flown_losses(loss_map: LossMap, flown: Floats) -> Floats:
-    """Return the losses within the hull of what was flown, from a tenth of its deflection on.
+    """Return the losses within the convex hull of the flown range, without those near neutral.
 
-    Without flights, from a tenth of the travel on.
+    Without flights, return the losses from a tenth of the travel on.
     """
     q, d = np.meshgrid(loss_map.pressure_Pa, loss_map.deflection, indexing="ij")
     sizes = np.array([[loss_map.pressure_Pa[-1]], [loss_map.deflection[-1]]])
@@ -151,8 +151,8 @@ def _flown_losses(loss_map: LossMap, flown: Floats) -> Floats:
     return np.asarray(loss_map.loss[inside])
 
 
-def _grey(maps: Mapping[ControlName, Sequence[LossMap]]) -> str:
-    """Return what is drawn grey: what has no loss near neutral, and what has none far out."""
+def _grey_note(maps: Mapping[ControlName, Sequence[LossMap]]) -> str:
+    """Return a note on the grey areas: within the breakout, or beyond the reach of the grip."""
     rests = [bool(np.isnan(m.loss[:, 0]).any()) for each in maps.values() for m in each]
     held = [
         bool((np.isnan(m.loss[:, -1]) & ~np.isnan(m.loss).all(axis=1)).any())
@@ -165,7 +165,7 @@ def _grey(maps: Mapping[ControlName, Sequence[LossMap]]) -> str:
 
 
 def _outline(axes: Axes, flown: Floats, factors: tuple[float, float]) -> None:
-    """Draw the hull of what was flown, where it is more than a line."""
+    """Draw the convex hull of the flown range, if it has an area."""
     points = np.stack((factors[0] * flown[0], factors[1] * flown[1]), axis=1)
     try:
         corners = _hull(points)
@@ -176,12 +176,12 @@ def _outline(axes: Axes, flown: Floats, factors: tuple[float, float]) -> None:
 
 
 def _hull(points: Floats) -> Floats:
-    """Return the corners of the hull of points, shape (corners, 2)."""
+    """Return the corners of the convex hull of points, shape (corners, 2)."""
     return np.asarray(points[ConvexHull(points).vertices])
 
 
 def draw_feel(name: str, feel: Feel, system: System = "si") -> Figure:
-    """Draw the column's force per g and per knot against q̄."""
+    """Draw the column force per g and per knot against q̄."""
     figure, grid = panels(1, 2, 3.6)
     pressure, force = pressure_shown(system), in_system("N", system)
     rows = (

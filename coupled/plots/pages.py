@@ -1,4 +1,4 @@
-"""What the pages of a documentation share: units, panels, titles."""
+"""Shared by the pages of a force documentation: units, panels and titles."""
 
 from __future__ import annotations
 
@@ -12,32 +12,32 @@ from coupled.record.channels import unit_of
 if TYPE_CHECKING:
     from coupled.calibration.documentation import Documentation, FeelCondition
 
-NARROWEST = 7.4  # inches that a page's title needs
+NARROWEST = 7.4  # inches; least width for the title of a page
 GRAY, ORANGE, GREEN, BLUE = "0.62", "#d55e00", "#009e73", "#0072b2"
 
 
 def deflection_shown(control: str, system: System = "si") -> Shown:
-    """Return the unit in which a control's deflection is drawn."""
+    """Return the unit in which the deflection of a control is drawn."""
     return drawn(f"deflection_{unit_of(control)}", system)
 
 
 def plain(text: str, longest: int = 20) -> str:
-    """Return a user's words cut to length, where a dollar sign would begin a formula."""
+    """Return a user's text cut to a length, with dollar signs escaped for matplotlib."""
     cut = text if len(text) <= longest else text[: longest - 1] + "…"
     return "".join(c if c.isprintable() else "?" for c in cut).replace("$", r"\$")
 
 
 def panels(rows: int, columns: int, height: float) -> tuple[Figure, Any]:
-    """Return a figure of so many panels, each `height` inches tall, and their axes."""
+    """Return a figure with panels in rows and columns, `height` inches tall, and their axes."""
     wide = max(1.4 + 3.6 * columns, NARROWEST)
     figure = Figure(figsize=(wide, 1.1 + height * rows), layout="constrained")
     return figure, figure.subplots(rows, columns, squeeze=False)
 
 
 def case_panels(rows: int, cases: int, height: float) -> tuple[Figure, Any]:
-    """Return a figure with a column a case, and its axes by row and case.
+    """Return a figure with one column per case, and its axes by row and case.
 
-    The rows of a single case stand side by side.
+    The rows of a single case are side by side.
     """
     if cases > 1:
         return panels(rows, cases, height)
@@ -46,17 +46,17 @@ def case_panels(rows: int, cases: int, height: float) -> tuple[Figure, Any]:
 
 
 def pressure(pressure_Pa: float, system: System = "si") -> str:
-    """Return a dynamic pressure as a title has it."""
+    """Return a dynamic pressure as text for a title."""
     return f"q̄ = {pressure_in(pressure_Pa, system)}"
 
 
 def title(found: Documentation, what: str) -> str:
-    """Return a page's title."""
+    """Return the title of a page."""
     return f"{found.rig.name}, {found.control}: {what}"
 
 
 def leg_names(condition: FeelCondition) -> list[str]:
-    """Return what a legend calls the reference's legs: a name for the first that is there."""
+    """Return the legend labels of the reference's legs: only the first one present has a name."""
     there = [leg.deflection.size > 0 for leg in condition.specified]
     name = "aircraft" if any(leg.read for leg in condition.specified) else "specified"
     return [name if k == there.index(True) else "" for k in range(len(there))]

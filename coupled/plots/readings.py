@@ -1,4 +1,4 @@
-"""The report's figure 4: readings at each gradient with the fit."""
+"""Figure 4 of the report: readings at each gradient with the fit."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def plus_minus(found: Estimate) -> str:
-    """Return a figure with half of its interval, both to the latter's second digit."""
+    """Return a value ± half of its interval, both to the second digit of the half width."""
     if not 0.0 < found.half_width < abs(found.value):
         return f"{found.value:.6g} ± {found.half_width:.2g}"
     power = int(np.floor(np.log10(abs(found.value))))
@@ -34,7 +34,7 @@ def plus_minus(found: Estimate) -> str:
 
 
 def draw_readings(found: CalibrationResult, source: str, system: System = "si") -> Figure:
-    """Draw the report's figure 4: readings at each gradient with the fit, and what is left."""
+    """Draw figure 4 of the report: readings at each gradient, the fit and its residuals."""
     shown = deflection_shown(found.control, system)
     factor, unit = shown.factor, shown.unit
     figure = Figure(figsize=(8.2, 6.8), layout="constrained")
@@ -53,7 +53,7 @@ def draw_readings(found: CalibrationResult, source: str, system: System = "si") 
             name += f" ({gradient * INCH_m / POUND_N:.3g} lb/in)"
         style: dict[str, Any] = {"color": color, "marker": mark, "linestyle": "none"}
         top.plot(factor * d, readings.v1[ours], label=name, **style)
-        # Beyond a breakout F is no multiple of δ: the fit is drawn from reading to reading.
+        # With a breakout F is not proportional to δ: the fit is drawn from reading to reading.
         at, fit = np.append(d, 0.0), np.append(a * d + b * f, 0.0)
         order = np.argsort(at)
         top.plot(factor * at[order], fit[order], color=color, linewidth=0.9)

@@ -1,4 +1,4 @@
-"""The figure of a sweep: its indices, its boundaries, or the figures that it kept."""
+"""The figure of a sweep: Sobol indices, stability boundaries, or figures of merit."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ _USUAL = Layout()
 
 
 def draw_result(found: SweepResult, system: System = "si", layout: Layout = _USUAL) -> Figure:
-    """Draw what a sweep asks for, its figures in the units of a system.
+    """Draw the result of a sweep, in the units of `system`.
 
-    Raises InputError for panels named of indices or boundaries.
+    Raises InputError if `layout` names panels of indices or boundaries.
     """
     asked, said = found.plan.sweep, " ".join(found.remarks)
     check_layout(asked, layout)
@@ -40,7 +40,7 @@ def draw_result(found: SweepResult, system: System = "si", layout: Layout = _USU
 
 
 def check_layout(asked: SweepFile, layout: Layout) -> None:
-    """Refuse panels that a sweep's figure does not have, before it is flown."""
+    """Refuse panels that the figure of a sweep does not have, before the sweep is flown."""
     if asked.method == "sensitivity" or asked.survive:
         if layout.panels or layout.overlay:
             key = "--panels" if layout.panels else "--overlay"

@@ -1,6 +1,6 @@
-"""A rig: the gradient that it gives over dynamic pressure, and what its bend would take.
+"""A rig: its gradient over dynamic pressure, and the share lost by structural compliance.
 
-Of a specified curve: the force over deflection, specified and felt, at its lowest and highest q̄.
+With a specified curve: the force over deflection, specified and felt, at the lowest and highest q̄.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _POINTS = 200
 
 
 def draw_rig(rig: Rig) -> Figure:
-    """Draw each control's G_T over q̄, and the share that its bend takes without a correction."""
+    """Draw G_T of each control over q̄, and the share lost to compliance without a correction."""
     rig.check_controlled(rig.file)
     rows, curves = (
         len(rig.controls),
@@ -50,12 +50,12 @@ def draw_rig(rig: Rig) -> Figure:
     for axes in np.ravel(straight if curves else grid[-1]):
         axes.set_xlabel("q̄, kPa")
         axes.set_xlim(0.0, highest / 1000.0)
-    figure.suptitle(plain(f"{rig.name}: gradient, and what the bend takes", 60), fontsize=12)
+    figure.suptitle(plain(f"{rig.name}: gradient, and loss to compliance", 60), fontsize=12)
     return figure
 
 
 def _draw_curve(left: Any, right: Any, rig: Rig, name: ControlName) -> None:
-    """Draw a control's curve beside what is felt, and the share lost without a correction."""
+    """Draw the specified and the felt curve, and the share lost without a correction."""
     control, d = rig.controls[name], unit_of(name)
     uncorrected = configure(rig, "uncompensated")
     computed = control.travel * np.linspace(-1.0, 1.0, _POINTS)

@@ -1,4 +1,4 @@
-"""Writing a figure: its formats, and the same bytes for the same figure."""
+"""Writing a figure: its formats and reproducible bytes."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ _NOTED = 10  # font size of a title with a note
 _LETTERS_per_inch = 10.0  # of a note
 _DOTS_per_inch = 130
 FORMATS = (".png", ".pdf", ".svg")
-BOX = "□"  # in place of a letter that no font has
-# Fonts with the letters of languages that matplotlib's own font lacks, of the common systems.
+BOX = "□"  # replaces a character that no font has
+# Common system fonts with the letters that matplotlib's own font lacks.
 OTHER_FONTS = (
     *("Noto Sans CJK JP", "Noto Sans CJK SC", "Source Han Sans", "WenQuanYi Zen Hei", "IPAGothic"),
     *("Hiragino Sans", "PingFang SC", "Microsoft YaHei", "Yu Gothic", "MS Gothic", "Malgun Gothic"),
@@ -35,16 +35,16 @@ OTHER_FONTS = (
 
 
 def check_format(path: Path) -> None:
-    """Refuse a figure's path whose extension names no format."""
+    """Refuse the path of a figure whose extension is not a known format."""
     if path.suffix.lower() not in FORMATS:
         raise InputError(path, "", f"a figure ends in {', '.join(FORMATS)}")
 
 
 def make_drawable(figure: Figure) -> None:
-    """Give each text of a figure letters that can be drawn.
+    """Replace the characters of a figure's texts that cannot be drawn.
 
-    Control characters, which a viewer would act on, become `?`. A letter that the text's font
-    lacks is drawn in an installed font of `OTHER_FONTS` that has it, or else as an empty box.
+    Control characters become `?`. A letter that the font lacks is drawn in an installed font of
+    `OTHER_FONTS`, or else as an empty box.
     """
     for text in figure.findobj(Text):
         assert isinstance(text, Text)
@@ -66,7 +66,7 @@ def make_drawable(figure: Figure) -> None:
 
 
 def _drawable(word: str, font: FontProperties) -> tuple[str, list[str]]:
-    """Return a text that can be drawn, and the fonts that it needs beyond its own."""
+    """Return a text that can be drawn, and the additional fonts that it needs."""
     plain = printable(word)
     if plain.isascii():
         return plain, []
@@ -85,12 +85,12 @@ def _drawable(word: str, font: FontProperties) -> tuple[str, list[str]]:
 
 @lru_cache(maxsize=16)
 def _letters(file: str) -> frozenset[str]:
-    """Return the letters that a font has."""
+    """Return the characters of a font."""
     return frozenset(map(chr, get_font(file).get_charmap()))
 
 
 def with_note(figure: Figure, note: str) -> Figure:
-    """Return a figure with a line of text below its title; as it is for an empty text."""
+    """Return a figure with a line of text below its title; unchanged for an empty text."""
     if note:
         width = round(_LETTERS_per_inch * figure.get_size_inches()[0])
         lines = [figure.get_suptitle(), *textwrap.wrap(note, width)]
@@ -99,9 +99,9 @@ def with_note(figure: Figure, note: str) -> Figure:
 
 
 def save(figure: Figure, path: Path, note: str = "") -> None:
-    """Write a figure, whole; the same figure gives the same bytes on the same machine.
+    """Write a figure atomically; the same figure gives the same bytes on the same machine.
 
-    The `note` is a line below its title. Letters of a PDF stay text.
+    `note` is a line below the title. Letters in a PDF stay text.
     """
     check_format(path)
     with_note(figure, note)
@@ -110,7 +110,7 @@ def save(figure: Figure, path: Path, note: str = "") -> None:
     kind = path.suffix.lower()[1:]
     no_date: dict[str, Any] = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}.get(kind, {})
     with rc_context({"svg.hashsalt": "coupled", "pdf.fonttype": 42}):
-        # Into memory first: matplotlib raises what it likes where a disk is full.
+        # Into memory first: on a full disk matplotlib raises many kinds of exceptions.
         drawn = BytesIO()
         figure.savefig(
             drawn, dpi=max(_DOTS_per_inch, figure.get_dpi()), format=kind, metadata=no_date
@@ -119,9 +119,9 @@ def save(figure: Figure, path: Path, note: str = "") -> None:
 
 
 def svg_text(figure: Figure) -> str:
-    """Return a figure as SVG, its letters as outlines: it looks alike wherever it is shown.
+    """Return a figure as SVG with letters as outlines, so that it does not depend on fonts.
 
-    A shaded mesh is an image within it: as outlines it would be some 10 MB.
+    A shaded mesh is a raster image: as outlines it would take some 10 MB.
     """
     for mesh in figure.findobj(QuadMesh):
         mesh.set_rasterized(True)

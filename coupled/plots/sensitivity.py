@@ -1,4 +1,4 @@
-"""Sobol's indices drawn: bars of what each parameter does alone, and with others."""
+"""Sobol indices: bars of the first-order and total index of each parameter."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from coupled.campaign.sensitivity import SobolIndex
 from coupled.display import parameter_label
 from coupled.plots.pages import BLUE, GRAY, ORANGE, plain
 
-_LONGEST = 44  # letters of a parameter
+_LONGEST = 44  # characters of a parameter's name
 
 
 def draw_sensitivity(indices: Sequence[SobolIndex]) -> Figure:
-    """Draw the indices: a row a figure, a column a configuration, bars a parameter.
+    """Draw the indices: one row per figure of merit, one column per configuration.
 
-    The parameters stand in the order of their greatest total index, the strongest on top.
+    The parameters are sorted by their greatest total index, the largest on top.
     """
     configurations = list(dict.fromkeys(index.configuration for index in indices))
     figures = list(dict.fromkeys(index.figure for index in indices))
@@ -41,7 +41,7 @@ def draw_sensitivity(indices: Sequence[SobolIndex]) -> Figure:
                 if (index.figure, index.configuration) == (figure, configuration)
             }
             _panel(axes, [here[key] for key in keys])
-            name = kept_figure(figure).words  # a share of variance has not its unit
+            name = kept_figure(figure).words  # a share of variance has no unit
             axes.set_title(f"{name}: {plain(configuration)}", fontsize=10)
             axes.set_yticks(range(len(keys)), [_label(key) for key in keys], fontsize=8)
     for axes in grid[-1]:
@@ -52,7 +52,7 @@ def draw_sensitivity(indices: Sequence[SobolIndex]) -> Figure:
 
 
 def _label(key: str) -> str:
-    """Return a parameter without its unit, which its share does not have."""
+    """Return the label of a parameter without its unit."""
     return plain(parameter_label(key).partition(",")[0], _LONGEST)
 
 

@@ -1,4 +1,4 @@
-"""A flight in which the structure changes: what a fixed and an adapted compensation lose by it."""
+"""A flight whose structure changes: authority lost with a fixed and an adapted compensation."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ WINDOW_s = 4.0
 
 
 def lost_share(record: Record, control: str, window_s: float = WINDOW_s) -> tuple[Floats, Floats]:
-    """Return times in s, and the share of δ that δ̂ lacks around each: 1 − Σδ·δ̂/Σδ².
+    """Return times in s, and the share of δ that δ̂ lacks around each time: 1 − Σδ·δ̂/Σδ².
 
-    Least squares over a window, so that a control that passes neutral divides by nothing.
+    The share is a least squares fit over a window, so it is defined where the control is neutral.
     """
     true = record[channel(control, "deflection")]
     estimated = record[channel(control, "estimate")]
@@ -25,7 +25,7 @@ def lost_share(record: Record, control: str, window_s: float = WINDOW_s) -> tupl
     box = np.ones(rows)
     both, own = (np.convolve(product, box, "valid") for product in (true * estimated, true * true))
     middle = time[rows // 2 : rows // 2 + len(own)]
-    moved = own > 0.02 * own.max()  # what hardly moves loses nothing that is felt
+    moved = own > 0.02 * own.max()  # small motion has no significant loss
     return middle[moved], 1.0 - both[moved] / own[moved]
 
 

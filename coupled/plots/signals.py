@@ -1,8 +1,8 @@
-"""The signals that make an effect visible, as measured and as a rig has them.
+"""The signals that the signature figures draw, as measured and as predicted with a rig.
 
-Each is computed in the same way from the record (`rig` None) and from what a rig predicts of it,
-so that the three curves of a figure differ by the rig alone. What is "missing" or "left" is so
-with respect to the scene's base: the rig without the effect that the scene is of.
+Each signal is computed in the same way from the record (`rig` None) and from the prediction with a
+rig, so the curves of a figure differ by the rig only. A "missing" or "left" signal is the residual
+relative to the base of the scene: the rig without the effect that is drawn.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ from coupled.rig.replay import replay_product, replay_surface
 from coupled.rig.rig import Rig
 from coupled.units import DEGREE_rad
 
-LITTLE = 10.0  # % of the surface's travel under which a ratio of commands says nothing
+_SMALLEST_COMMAND_percent = 10.0  # of the travel; smaller commands give no ratio
 
-STICKS = 0.1  # of a signal's own size, under which its side is not sure
+_SMALLEST_SHARE = 0.1  # share of a signal's size, below which its sign is uncertain
 
 
 @dataclass(frozen=True)
 class Scene:
-    """One record, its outputs, and the base: the rig without the effect looked for."""
+    """One record, its outputs, and the base rig: the rig without the effect that is drawn."""
 
     reader: Reading
     outputs: tuple[Output, ...]
@@ -46,37 +46,37 @@ class Scene:
 
     @property
     def loader(self) -> Loader:
-        """The base's loader."""
+        """The loader of the base rig."""
         return self.base.controls[self.reader.control].loader
 
     @property
     def frame_rate(self) -> float:
-        """Frames a second, Hz."""
+        """The frame rate, Hz."""
         return self.base.frame_rate
 
     @property
     def fine(self) -> float:
-        """Factor to the unit of small deflections: mm, or ° of a wheel."""
+        """Factor to the unit of small deflections: mm, or ° for a wheel."""
         return 1000.0 if unit_of(self.reader.control) == "m" else 1.0 / DEGREE_rad
 
     @property
     def coarse(self) -> float:
-        """Factor to the unit of what is per deflection: m, or ° of a wheel."""
+        """Factor to the unit of quantities per deflection: m, or ° for a wheel."""
         return 1.0 if unit_of(self.reader.control) == "m" else 1.0 / DEGREE_rad
 
     def channel(self, quantity: str) -> str:
-        """Return the channel of a quantity of the control; any other is one already."""
+        """Return the channel of a quantity of the control; a channel name is returned as given."""
         try:
             return channel(self.reader.control, quantity)
         except KeyError:
             return quantity
 
     def rate(self, signal: Floats) -> Floats:
-        """Return a signal's rate of change a second."""
+        """Return the time derivative of a signal, per second."""
         return rate_of(signal, self.frame_rate)
 
     def raw(self, quantity: str, rig: Rig | None) -> Floats:
-        """Return an output as measured, or as a rig predicts it; KeyError where there is none."""
+        """Return an output as measured or as predicted. Raises KeyError if it is missing."""
         name = self.channel(quantity)
         for output in self.outputs:
             if output.channel == name:
@@ -84,15 +84,15 @@ class Scene:
         raise KeyError(name)
 
     def seen(self, quantity: str, rig: Rig | None) -> Floats:
-        """Return the same without its white noise."""
+        """Return the same output with the white noise smoothed out."""
         return smoothed(self.raw(quantity, rig))
 
     def smooth(self, quantity: str) -> Floats:
-        """Return a measured channel without its white noise; KeyError where there is none."""
+        """Return a smoothed channel of the record. Raises KeyError if it is missing."""
         return smoothed(self.recorded(quantity))
 
     def recorded(self, quantity: str) -> Floats:
-        """Return a measured channel as it is; KeyError with its name where there is none."""
+        """Return a channel of the record. Raises KeyError with its name if it is missing."""
         name = self.channel(quantity)
         if name not in self.reader.record:
             raise KeyError(name)
@@ -100,7 +100,7 @@ class Scene:
 
 
 def _computed(scene: Scene, rig: Rig | None) -> Floats:
-    """Return δc; as measured where no loader could be judged."""
+    """Return δc; the measured one if no loader is judged."""
     try:
         seen = scene.seen("computed", rig)
     except KeyError:
@@ -108,11 +108,11 @@ def _computed(scene: Scene, rig: Rig | None) -> Floats:
     return seen / scene.base.controls[scene.reader.control].sensing.read_scale
 
 
-def _missing(scene: Scene, rig: Rig | None) -> Floats:
-    """Return F − m·δc'' − c·δc' − G_B·δc − F_mod with the base's numbers, in N.
+def _missing_force(scene: Scene, rig: Rig | None) -> Floats:
+    """Return F − m·δc'' − c·δc' − G_B·δc − F_mod with the parameters of the base, in N.
 
-    What else the base has is taken off too; NaN where its dry friction or its breakout holds,
-    and may be anything up to its size.
+    All further loader forces of the base are subtracted too. The value is NaN where dry friction or
+    a breakout holds the loader, since these forces are not determined there.
     """
     at = _computed(scene, rig)
     speed, loader = scene.rate(at), scene.loader
@@ -126,8 +126,8 @@ def _missing(scene: Scene, rig: Rig | None) -> Floats:
         held = held - loader.regressor_force * away
     spring = loader.basic_gradient * at + loader.cubic * at**3 + loader.force_curve.at(at)
     left = scene.smooth("force") - moved - spring - product - held
-    sticks = (loader.friction > 0.0) & (np.abs(speed) < STICKS * np.std(speed))
-    sticks |= (loader.breakout > 0.0) & (np.abs(at) < STICKS * np.std(at))
+    sticks = (loader.friction > 0.0) & (np.abs(speed) < _SMALLEST_SHARE * np.std(speed))
+    sticks |= (loader.breakout > 0.0) & (np.abs(at) < _SMALLEST_SHARE * np.std(at))
     return np.where(sticks, np.nan, left)
 
 
@@ -139,7 +139,7 @@ def _against_base(quantity: str) -> Callable[[Scene, Rig | None], Floats]:
 
 
 def _bent(scene: Scene, rig: Rig | None) -> Floats:
-    """Return δ less the base's servo: what the structure gives under F."""
+    """Return δ minus the servo position of the base: the bend of the structure under F."""
     return _against_base("deflection")(scene, rig) + scene.loader.bend * scene.smooth("force")
 
 
@@ -148,18 +148,18 @@ def _servo_speed(scene: Scene, rig: Rig | None) -> Floats:
     return scene.fine * scene.rate(unbent)
 
 
-def _answer(scene: Scene, rig: Rig | None) -> Floats:
-    """Return the command that the surface's position answers to, % about trim, pull positive."""
+def _response(scene: Scene, rig: Rig | None) -> Floats:
+    """Return the command for which the surface has its position, % about trim, pull positive."""
     control = scene.reader.control
     position = scene.raw(surface_channel(control), rig)
     sign = COMMAND_SIGN[scene.base.controls[control].surface]
     points = surface_points(scene.base, control)
-    assert points is not None  # or its stage would not have been judged
+    assert points is not None  # else its stage would not be judged
     return 100.0 * sign * command_of(position, points)
 
 
-def _wanted(scene: Scene) -> Floats:
-    """Return the command that the base gives the surface, a frame later, in %."""
+def _command(scene: Scene) -> Floats:
+    """Return the surface command of the base one frame later, in %."""
     control = scene.reader.control
     estimate, pressure = scene.recorded("estimate"), scene.recorded("dynamic_pressure_Pa")
     commands = replay_surface(scene.base, control, estimate, pressure)
@@ -168,9 +168,9 @@ def _wanted(scene: Scene) -> Floats:
 
 
 def _ratio(scene: Scene, rig: Rig | None) -> Floats:
-    """Return how much of the command the surface does; NaN where little is asked."""
-    wanted, answer = _wanted(scene), _answer(scene, rig)
-    asked = np.abs(wanted) > LITTLE
+    """Return the ratio of surface response to command; NaN for small commands."""
+    wanted, answer = _command(scene), _response(scene, rig)
+    asked = np.abs(wanted) > _SMALLEST_COMMAND_percent
     ratio = np.full(len(wanted), np.nan)
     ratio[asked] = answer[asked] / wanted[asked]
     return ratio
@@ -192,19 +192,19 @@ def _crossing_air(scene: Scene, rig: Rig | None) -> Floats:
 
 @dataclass(frozen=True)
 class Signal:
-    """A signal: what it is, its unit ({d} mm or °, {D} m or °), and how it is come by."""
+    """A signal: label, unit ({d} mm or °, {D} m or °), and the function that computes it."""
 
     label: str
     unit: str
     get: Callable[[Scene, Rig | None], Floats]
 
     def label_on(self, control: str) -> str:
-        """Return the label with its unit on a control."""
+        """Return the label with the unit for a control."""
         small, large, tiny = ("mm", "m", "µm") if unit_of(control) == "m" else ("°", "°", "0.001°")
         return f"{self.label}, {self.unit.format(d=small, D=large, u=tiny)}"
 
     def shown_in(self, control: str, system: System) -> Signal:
-        """Return the signal in the units of a system; as it is in SI."""
+        """Return the signal in the units of a system; unchanged in SI."""
         if system == "si":
             return self
         length, angle = unit_of(control) == "m", "°"
@@ -218,21 +218,21 @@ class Signal:
 
 
 def _other_force(scene: Scene) -> Floats:
-    """Return the force on the control that leaks into this one; KeyError where there is none."""
+    """Return the force on the control that leaks into this control. Raises KeyError without one."""
     for force in scene.reader.partner():
         return smoothed(force)
     raise KeyError("force on another control")
 
 
 def _regressor(scene: Scene) -> Floats:
-    """Return the regressor less its reference; KeyError where the rig file names none."""
+    """Return the regressor minus its reference. Raises KeyError without a regressor."""
     if (away := scene.reader.regressor()) is None:
         raise KeyError("regressor")
     return away
 
 
 def _about_trim(scene: Scene, surface: str) -> Floats:
-    """Return a surface's position from where the record begins, °."""
+    """Return the surface position relative to the first row, °."""
     position = scene.smooth(surface)
     return np.asarray((position - position[0]) / DEGREE_rad)
 
@@ -256,11 +256,11 @@ SIGNALS: dict[str, Signal] = {
         "acceleration δc″", "{D}/s²", lambda s, r: s.coarse * s.rate(s.rate(_computed(s, r)))
     ),
     "computed": Signal("computed deflection δc", "{d}", lambda s, r: s.fine * _computed(s, r)),
-    "missing": Signal("missing force\nF − m·δc″ − c·δc′ − G_B·δc − F_mod", "N", _missing),
+    "missing": Signal("missing force\nF − m·δc″ − c·δc′ − G_B·δc − F_mod", "N", _missing_force),
     "force": Signal("pilot's force F", "N", lambda s, r: s.smooth("force")),
     "other_force": Signal("force on the other control", "N", lambda s, r: _other_force(s)),
     "load": Signal("load factor beyond 1", "g", lambda s, r: s.smooth("load_factor") - 1.0),
-    "regressor": Signal("regressor less its reference", "its unit", lambda s, r: _regressor(s)),
+    "regressor": Signal("regressor minus its reference", "its unit", lambda s, r: _regressor(s)),
     "pressure": Signal(
         "dynamic pressure q̄", "kPa", lambda s, r: 1e-3 * s.smooth("dynamic_pressure_Pa")
     ),
@@ -268,32 +268,32 @@ SIGNALS: dict[str, Signal] = {
         "scheduled gradient G_T", "N/{D}", lambda s, r: s.raw("gradient", r) / s.coarse
     ),
     "computed_left": Signal(
-        "δc beyond the loader's", "{d}", lambda s, r: s.fine * _against_base("computed")(s, r)
+        "δc minus the loader model's", "{d}", lambda s, r: s.fine * _against_base("computed")(s, r)
     ),
-    "product_left": Signal("F_mod beyond ΔG·δc", "N", _against_base("modifying_force")),
-    "noise": Signal("noise of δc as read", "{u}", _noise),
+    "product_left": Signal("F_mod − ΔG·δc", "N", _against_base("modifying_force")),
+    "noise": Signal("noise of the measured δc", "{u}", _noise),
     "bent": Signal("bend δ − x", "{d}", lambda s, r: s.fine * _bent(s, r)),
     "deflection_left": Signal(
-        "rest of the grip δ − x − K·F",
+        "residual δ − x − K·F",
         "{d}",
         lambda s, r: s.fine * _against_base("deflection")(s, r),
     ),
     "estimate_left": Signal(
-        "δ̂ beyond the host's arithmetic",
+        "δ̂ minus the host model's",
         "{d}",
         lambda s, r: s.fine * _against_base("estimate")(s, r),
     ),
     "deflection": Signal("grip δ", "{d}", lambda s, r: s.fine * s.seen("deflection", r)),
     "servo_speed": Signal("rate of the servo (δ − K·F)′", "{d}/s", _servo_speed),
-    "wanted": Signal("surface commanded about trim", "%", lambda s, r: _wanted(s)),
-    "wanted_rate": Signal("rate of the command", "%/s", lambda s, r: s.rate(smoothed(_wanted(s)))),
+    "wanted": Signal("surface commanded about trim", "%", lambda s, r: _command(s)),
+    "wanted_rate": Signal("command rate", "%/s", lambda s, r: s.rate(smoothed(_command(s)))),
     "answer_left": Signal(
-        "surface's answer less its command", "%", lambda s, r: _answer(s, r) - _wanted(s)
+        "surface response − command", "%", lambda s, r: _response(s, r) - _command(s)
     ),
     "answer_rate": Signal(
-        "rate of the surface's answer", "%/s", lambda s, r: s.rate(smoothed(_answer(s, r)))
+        "rate of the response", "%/s", lambda s, r: s.rate(smoothed(_response(s, r)))
     ),
-    "ratio": Signal("surface's answer over its command", "1", _ratio),
+    "ratio": Signal("surface response over command", "1", _ratio),
     "elevator": Signal("elevator about trim", "°", lambda s, r: _about_trim(s, "elevator_rad")),
     "aileron": Signal("aileron about trim", "°", lambda s, r: _about_trim(s, "aileron_rad")),
     "rudder": Signal("rudder about trim", "°", lambda s, r: _about_trim(s, "rudder_rad")),
@@ -309,11 +309,11 @@ SIGNALS: dict[str, Signal] = {
     },
     **{
         f"{axis}_left": Signal(
-            f"{axis} rate beyond the model's", "°/s", partial(_left_in_degrees, axis)
+            f"{axis} rate minus the model's", "°/s", partial(_left_in_degrees, axis)
         )
         for axis in ("pitch", "roll", "yaw")
     },
     "load_answer": Signal("load factor", "g", lambda s, r: s.seen("load_factor", r)),
-    "air": Signal("rise of the air", "m/s", _air),
-    "crossing_air": Signal("air across the heading, from the left", "m/s", _crossing_air),
+    "air": Signal("vertical wind, up", "m/s", _air),
+    "crossing_air": Signal("crosswind, from the left", "m/s", _crossing_air),
 }

@@ -1,4 +1,7 @@
-"""What makes the named effect visible: its own law, measured and as the rigs have it."""
+"""The signature of each effect found: a scatter or loop plot of its law, and a zoom in time.
+
+The measured data and the predictions with and without the effect are drawn together.
+"""
 
 from __future__ import annotations
 
@@ -23,26 +26,26 @@ from coupled.plots.structure import draw_structure
 from coupled.rig.packing import COMMAND_SIGN
 from coupled.rig.rig import Rig
 
-_EDGE = 12  # frames at a record's ends that a derivative spoils
+_EDGE = 12  # frames at each end of a record where derivatives are inaccurate
 _BINS = 36
-_FEW = 4  # of them, at the least, under one median
+_FEW = 4  # fewest values in a bin that has a median
 _DOTS = 3000
 _LOOP_s = 5.0
 _SHOWN = (0.5, 99.5)  # percentiles of the values within the axes
-# The surface that is drawn beside a channel of the motion, else the elevator; where each turns to.
-_TURNS = {
+# The surface drawn with each channel of the motion (others: the elevator), and its positive sign.
+_SURFACE_OF = {
     "roll_rate_rad_per_s": "aileron",
     "roll_rad": "aileron",
     "yaw_rate_rad_per_s": "rudder",
     "sideslip_rad": "rudder",
     "heading_rad": "rudder",
 }
-_WAYS = {"elevator": "nose up", "aileron": "right wing down", "rudder": "nose right"}
+_POSITIVE_WAY = {"elevator": "nose up", "aileron": "right wing down", "rudder": "nose right"}
 
 
 @dataclass(frozen=True)
 class _Model:
-    """A rig that is drawn beside the measured: its name in the legend, and its style."""
+    """A rig drawn with the measurements: its name in the legend, and its line style."""
 
     label: str
     rig: Rig
@@ -50,9 +53,9 @@ class _Model:
 
 
 def draw_signature(view: View) -> Figure:
-    """Draw each found effect's own law and a zoom in time; and the structure of what is left.
+    """Draw the law of each effect found and a zoom in time.
 
-    The structure is drawn where no effect was found, or not enough.
+    If no effect was found, or the effects do not explain the residual, draw its structure too.
     """
     effects = view.effects
     rest = not effects or view.diagnosis.verdict == "unexplained"
@@ -90,14 +93,14 @@ def _draw_effect(figure: Any, view: View, effect: Effect) -> None:
 
 
 def _title(view: View, effect: Effect) -> str:
-    """Return the effect with its parameters."""
+    """Return the name of an effect with its parameters."""
     found = next(e for e in view.diagnosis.effects if e.name == effect.name)
     numbers = [change(in_units(p, view.system)) for p in found.parameters]
     return ", ".join([f"{effect.stage}: {plain(effect.name)}", *numbers])
 
 
 def _models(view: View, effect: Effect, base: Rig) -> list[_Model]:
-    """Return the rigs to draw: without the effect, with it, and with its first rival instead."""
+    """Return the rigs to draw: without the effect, with it, and with its first alternative."""
     alone = len(view.effects) == 1
     models = [_Model("nominal" if alone else "without it", base, "wrong")]
     models.append(_Model(f"with {plain(effect.name)}", view.diagnosis.improved, "right"))
@@ -110,7 +113,7 @@ def _models(view: View, effect: Effect, base: Rig) -> list[_Model]:
 def _draw_law(
     axes: Any, scene: Scene, signature: Signature, models: Sequence[_Model], system: System
 ) -> None:
-    """Draw the effect's law: what was measured as dots, the rigs as lines."""
+    """Draw the law of an effect: measurements as dots, predictions as lines."""
     control, y = scene.reader.control, SIGNALS[signature.y].shown_in(scene.reader.control, system)
     axes.set_ylabel(y.label_on(control), fontsize=9)
     if signature.drawing == "time":
@@ -124,16 +127,16 @@ def _draw_law(
     axes.set_xlabel(x.label_on(control), fontsize=9)
     inner = slice(_EDGE, -_EDGE)
     at, seen = x.get(scene, None)[inner], y.get(scene, None)[inner]
-    wide, high = _reach(at), _reach(seen)
+    wide, high = _model_range(at), _model_range(seen)
     known = [
-        (m, _within(wide, x.get(scene, m.rig)[inner]), _within(high, y.get(scene, m.rig)[inner]))
+        (m, _cut(wide, x.get(scene, m.rig)[inner]), _cut(high, y.get(scene, m.rig)[inner]))
         for m in models
     ]
     rows = _widest_window(seen - known[0][2], round(_LOOP_s * scene.frame_rate))
     if signature.drawing == "loop":
         axes.plot(at, seen, ".", color="0.75", markersize=1.5, zorder=0, rasterized=True)
         axes.plot(at[rows], seen[rows], **{**style_of("measured"), "linewidth": 1.8})
-        title = f"loops of {_LOOP_s:g} s; dots: all that was measured"
+        title = f"loops of {_LOOP_s:g} s; dots: all measurements"
         for model, across, up in known:
             axes.plot(across[rows], up[rows], **style_of(model.kind))
     else:
@@ -142,26 +145,26 @@ def _draw_law(
         for model, across, up in known:
             axes.plot(*_medians(across, up), **style_of(model.kind))
         axes.plot(*_medians(at, seen), "o", color=look.MEASURED, markersize=3.5, zorder=4)
-        title = "dots: measured; black: their medians; lines: medians"
+        title = "dots: measured; black: medians; lines: predicted medians"
     axes.set_title(title, fontsize=9, loc="left")
-    axes.set_xlim(_ends([at, *(across for _, across, _ in known)]))
-    axes.set_ylim(_ends([seen, *(up for _, _, up in known)]))
+    axes.set_xlim(_limits([at, *(across for _, across, _ in known)]))
+    axes.set_ylim(_limits([seen, *(up for _, _, up in known)]))
 
 
-def _reach(measured: Floats) -> tuple[float, float]:
-    """Return how far a model is drawn: the measured values' span beyond them."""
+def _model_range(measured: Floats) -> tuple[float, float]:
+    """Return the range in which a model is drawn: the measured range, extended by its span."""
     low, high = np.nanpercentile(measured, _SHOWN)
     span = float(high - low) or 1.0
     return float(low - span), float(high + span)
 
 
-def _within(ends: tuple[float, float], values: Floats) -> Floats:
-    """Return values with NaN beyond the ends, as of derivatives where a replay restarts."""
+def _cut(ends: tuple[float, float], values: Floats) -> Floats:
+    """Return values with NaN outside the range, for derivatives where a replay restarts."""
     return np.where((values >= ends[0]) & (values <= ends[1]), values, np.nan)
 
 
-def _ends(series: Sequence[Floats]) -> tuple[float, float]:
-    """Return the ends of an axis, without the few dots that a derivative throws far out."""
+def _limits(series: Sequence[Floats]) -> tuple[float, float]:
+    """Return the limits of an axis, without outliers of the derivative."""
     known = [one for one in series if np.isfinite(one).any()]
     each = np.array([np.nanpercentile(one, _SHOWN) for one in known])
     low, high = float(each[:, 0].min()), float(each[:, 1].max())
@@ -170,12 +173,12 @@ def _ends(series: Sequence[Floats]) -> tuple[float, float]:
 
 
 def _medians(x: Floats, y: Floats) -> tuple[Floats, Floats]:
-    """Return medians of y by bins of x."""
+    """Return the medians of y in bins of x."""
     known = np.isfinite(x) & np.isfinite(y)
     x, y = x[known], y[known]
     if not len(x):
         return x, y
-    # Half of the edges by count, for what is dense, and half by width, for what is rare.
+    # Half of the edges at quantiles, for dense data, and half equally spaced, for sparse data.
     shares = np.linspace(0.0, 1.0, _BINS // 2 + 1)
     edges = np.union1d(np.quantile(x, shares), x.min() + shares * np.ptp(x))
     number = np.searchsorted(edges[1:-1], x)
@@ -186,7 +189,7 @@ def _medians(x: Floats, y: Floats) -> tuple[Floats, Floats]:
 
 
 def _widest_window(left: Floats, frames: int) -> slice:
-    """Return the window of so many frames in which a residual is largest."""
+    """Return the window of `frames` rows with the largest sum of squared residuals."""
     frames = min(frames, len(left))
     total = np.cumsum(np.concatenate(([0.0], np.nan_to_num(left) ** 2)))
     start = int(np.argmax(total[frames:] - total[:-frames]))
@@ -196,7 +199,7 @@ def _widest_window(left: Floats, frames: int) -> slice:
 def _draw_zoom(
     axes: Any, view: View, output: Output, models: Sequence[_Model], length_s: float
 ) -> None:
-    """Draw measured and predicted over time, where they differ most; the input beneath."""
+    """Draw measurement and predictions over time where they differ most, with the input scaled."""
     shown = channel_shown(output.channel, view.system)
     factor = shown.factor
     made = [(model, factor * output.predict(model.rig)) for model in models]
@@ -230,13 +233,13 @@ def _draw_zoom(
 
 
 def _input(view: View, output: Output) -> tuple[str, Floats] | None:
-    """Return what drives an output's stage, where the record has it."""
+    """Return label and signal of the input of the stage, or None if it is not recorded."""
     control, record = view.diagnosis.part.control, view.records[output.record]
     if output.stage == AIRFRAME:
-        surface = _TURNS.get(output.channel, "elevator")
+        surface = _SURFACE_OF.get(output.channel, "elevator")
         if f"{surface}_rad" not in record:
             return None
-        sign, way = COMMAND_SIGN[surface], _WAYS[surface]
+        sign, way = COMMAND_SIGN[surface], _POSITIVE_WAY[surface]
         return f"{surface}, {way}", sign * record[f"{surface}_rad"]
     label, name = STAGE_OF[output.stage].drive if output.stage in STAGE_OF else ("", "")
     name = f"{control}_force_N" if name == "force" else name

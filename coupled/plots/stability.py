@@ -1,4 +1,4 @@
-"""The figure of a rig's stability: simulated growth as colour, linear theory as a line."""
+"""The figure of the stability of a rig: simulated growth rates, and the linear limit as a line."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from coupled.record.channels import ControlName
 from coupled.rig.rig import Rig
 from coupled.units import MILLISECOND_s
 
-_FASTEST = 100.0  # 1/s, the ends of the colours
-_LINEAR = 3.0  # 1/s, within which they are even
+_FASTEST = 100.0  # 1/s, limits of the colour scale
+_LINEAR = 3.0  # 1/s, within which the colour scale is linear
 _ACROSS = 3
 _OWN = "#00a000"
 _LABELS: dict[Kind, str] = {
@@ -41,7 +41,7 @@ _TITLES: dict[Kind, str] = {
 
 
 def draw_stability(rig: Rig, planes: Mapping[ControlName, Sequence[Plane]]) -> Figure:
-    """Draw the planes of each control, in rows of three."""
+    """Draw the stability maps of each control, three per row."""
     rows = -(-len(KINDS) // _ACROSS)
     figure, grid = panels(rows * len(planes), _ACROSS, 2.9)
     norm = SymLogNorm(_LINEAR, vmin=-_FASTEST, vmax=_FASTEST)
@@ -51,7 +51,7 @@ def draw_stability(rig: Rig, planes: Mapping[ControlName, Sequence[Plane]]) -> F
             axes.set_visible(False)
         for axes, plane in zip(ours.flat, of_control, strict=False):
             mesh = _panel(axes, plane, norm)
-            _mark_own(axes, rig, plane)
+            _mark_rig_range(axes, rig, plane)
             axes.set_title(f"{name}, {_TITLES[plane.kind]}", fontsize=10)
         for axes in ours[-1]:
             axes.set_xlabel("structure's bend under the gradient, K·G_T", fontsize=9)
@@ -80,7 +80,7 @@ def _panel(axes: Axes, plane: Plane, norm: SymLogNorm) -> Any:
         shading="nearest",
     )
     if np.min(plane.fine) < 0.0 < np.max(plane.fine):
-        level = np.arcsinh(plane.fine.T)  # a pole of the spring is no place to interpolate over
+        level = np.arcsinh(plane.fine.T)  # interpolates over poles of the growth rate
         axes.contour(plane.fine_shares, fine_y, level, [0.0], colors="black", linewidths=1.4)
     axes.plot([], [], color="black", linewidth=1.4, label="limit by linear theory")
     axes.plot(
@@ -99,8 +99,8 @@ def _panel(axes: Axes, plane: Plane, norm: SymLogNorm) -> Any:
     return mesh
 
 
-def _mark_own(axes: Axes, rig: Rig, plane: Plane) -> None:
-    """Draw what the rig itself spans; at the edge, with an arrow, where that is off the map."""
+def _mark_rig_range(axes: Axes, rig: Rig, plane: Plane) -> None:
+    """Draw the range of the rig itself, with an arrow at the edge if it is outside the map."""
     own = filed(rig, plane.control, plane.kind)
     low, high = (_factor(plane) * end for end in (plane.values[0], plane.values[-1]))
     axes.set_ylim(low, high)
@@ -123,5 +123,5 @@ def _mark_own(axes: Axes, rig: Rig, plane: Plane) -> None:
 
 
 def _factor(plane: Plane) -> float:
-    """Return the factor to the unit in which a plane's quantity is drawn."""
+    """Return the factor to the unit in which the quantity of a map is drawn."""
     return 1.0 / MILLISECOND_s if plane.kind == "frame" else 1.0

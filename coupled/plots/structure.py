@@ -1,4 +1,4 @@
-"""The structure of a residual that no effect explains: what it goes with, strongest first."""
+"""The structure of an unexplained residual: its dependence on each signal, strongest first."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _DOTS = 2500
 
 
 def draw_structure(figure: Any, view: View) -> None:
-    """Draw what is left of the widest residual against each signal, and its spectrum."""
+    """Draw the largest remaining residual against each signal, and its spectrum."""
     improved = view.diagnosis.improved
     output = max(view.suspects(), key=lambda o: o.gap(improved))
     shown = channel_shown(output.channel, view.system, fine=True)
@@ -33,7 +33,7 @@ def draw_structure(figure: Any, view: View) -> None:
     for i, (axes, (share, label, signal)) in enumerate(zip(grid, panels, strict=False)):
         if label:
             _draw_against(axes, signal, left, label, shown)
-            title = f"{100.0 * share:.0f} % of its variance goes with it"
+            title = f"{100.0 * share:.0f} % of the variance explained"
         else:
             _draw_spectrum(axes, line, shown)
             title = f"{100.0 * share:.0f} % of its power at {line.frequency[line.peak]:.3g} Hz"
@@ -44,7 +44,7 @@ def draw_structure(figure: Any, view: View) -> None:
         axes.set_visible(False)
     what = f"{plain(output.stage)}: residual of the {shown.words}{view.source(output)}"
     gap = output.gap(improved)
-    figure.suptitle(f"{what}, {gap:.3g} × its floor, against what it may go with", fontsize=11)
+    figure.suptitle(f"{what}, {gap:.3g} × its noise floor, against signals", fontsize=11)
 
 
 def _draw_against(axes: Any, signal: Floats, left: Floats, label: str, unit: Shown) -> None:
@@ -55,7 +55,7 @@ def _draw_against(axes: Any, signal: Floats, left: Floats, label: str, unit: Sho
 
 
 def _signals(view: View, output: Output) -> list[tuple[str, Floats]]:
-    """Return the signals that a residual may go with, each with its label."""
+    """Return the signals that a residual may depend on, each with its label."""
     record, control = view.records[output.record], view.diagnosis.part.control
     d = unit_of(control)
     found: list[tuple[str, Floats]] = []
@@ -77,7 +77,7 @@ def _binned(signal: Floats) -> tuple[Any, int]:
 
 
 def _means(signal: Floats, left: Floats) -> tuple[Floats, Floats]:
-    """Return the means of a residual by the quantiles of a signal."""
+    """Return the means of a signal and of a residual in quantile bins of the signal."""
     number, bins = _binned(signal)
     count = np.maximum(np.bincount(number, minlength=bins), 1)
     return (
@@ -87,7 +87,7 @@ def _means(signal: Floats, left: Floats) -> tuple[Floats, Floats]:
 
 
 def _share(signal: Floats, left: Floats) -> float:
-    """Return the share of a residual's variance that its means by a signal take (η²)."""
+    """Return the share of a residual's variance explained by its bin means (η²)."""
     number, _ = _binned(signal)
     means = _means(signal, left)[1][number]
     return float(np.var(means) / max(float(np.var(left)), 1e-300))
@@ -100,7 +100,7 @@ def _thin(signal: Floats, left: Floats) -> tuple[Floats, Floats]:
 
 @dataclass(frozen=True)
 class _Spectrum:
-    """Amplitude by frequency in Hz, its peak's place, and the share of the power at the peak."""
+    """Amplitude over frequency in Hz, the index of the peak, and the share of power at the peak."""
 
     frequency: Floats
     amplitude: Floats
@@ -109,7 +109,7 @@ class _Spectrum:
 
 
 def _spectrum(left: Floats, frame_rate_Hz: float) -> _Spectrum:
-    """Return a residual's spectrum under a Hann window, whose line is four bins wide."""
+    """Return the spectrum of a residual with a Hann window, whose main lobe is four bins wide."""
     window = np.hanning(len(left))
     lines = np.fft.rfft((left - left.mean()) * window)
     amplitude = np.asarray(2.0 * np.abs(lines) / window.sum(), dtype=np.float64)
@@ -121,7 +121,7 @@ def _spectrum(left: Floats, frame_rate_Hz: float) -> _Spectrum:
 
 
 def _draw_spectrum(axes: Any, found: _Spectrum, unit: Shown) -> None:
-    """Draw the amplitude of each frequency, which shows a motion of its own."""
+    """Draw amplitude over frequency."""
     axes.plot(found.frequency[1:], found.amplitude[1:], color=look.RIVAL, linewidth=0.9)
     at = found.frequency[found.peak]
     axes.plot(at, found.amplitude[found.peak], "o", color=look.WRONG, markersize=4)

@@ -1,4 +1,4 @@
-"""A sweep's survival drawn: what each configuration survives, and where the boundary lies."""
+"""Survival in a sweep: the values that each configuration survives, and the boundary."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _LIVES, _LOST = "#009e73", "#cc0000"
 
 
 def draw_survival(name: str, key: str, limits: Sequence[SurvivalLimit]) -> Figure:
-    """Draw a row a configuration: a dot a value, whole where all its flights are survived."""
+    """Draw one row per configuration and one dot per value, paler if some flights were lost."""
     figure = Figure(figsize=(8.0, 1.5 + 0.45 * len(limits)), layout="constrained")
     axes = figure.subplots()
     places = np.arange(len(limits))[::-1]

@@ -1,4 +1,4 @@
-"""What the figures of a sweep share: labels with units, axes, and which figures vary at all."""
+"""Shared by the figures of a sweep: labels with units, axes, and the figures that vary."""
 
 from __future__ import annotations
 
@@ -17,34 +17,34 @@ from coupled.plots.histories import plain
 
 Floats = NDArray[np.float64]
 MOST_ROWS = 4
-_LETTERS_PER_INCH = 12.0  # of a title in 11 points, at the least
-_STILL = 1e-9  # what a figure spreads by where it does not vary: the arithmetic's own
-_EVEN = 1e-3  # of a step, by which steps differ that are taken as even
-_ONE_LINE = 0.01  # of a figure's span, within which lines are one to the eye
-_WIDE = 10.0  # greatest over least value of an axis that may be logarithmic
+_LETTERS_PER_INCH = 12.0  # least, for a title in 11 points
+_CONSTANT = 1e-9  # relative spread of a constant figure, by rounding
+_EVEN = 1e-3  # relative difference of steps that count as even
+_ONE_LINE = 0.01  # share of a figure's span within which lines count as coincident
+_WIDE = 10.0  # least ratio of greatest to least value for a logarithmic axis
 
 
 def in_unit(found: pl.DataFrame, name: str, unit: Shown) -> pl.DataFrame:
-    """Return a table with a column of numbers in a unit, NaN where it has no value."""
+    """Return a table with a column multiplied by the factor of a unit, NaN for missing values."""
     return found.with_columns(pl.col(name).cast(pl.Float64).fill_null(np.nan) * unit.factor)
 
 
 def varying(
     found: pl.DataFrame, figures: Sequence[str], system: System = "si"
 ) -> tuple[list[str], str]:
-    """Return the first figures that vary, and a remark on those that do not.
+    """Return the first figures that vary, and a remark on those that are constant.
 
-    All of them where none does: a figure of nothing says less than a level line.
+    If none varies, return the first one.
     """
     flown = found.filter(pl.col("ended_early") == "")
     drawn, still = [], []
     for name in figures:
         values = flown[name].drop_nulls().cast(pl.Float64).to_numpy()
         size = float(np.max(np.abs(values), initial=0.0))
-        if values.size and np.ptp(values) <= _STILL * max(size, 1.0):
+        if values.size and np.ptp(values) <= _CONSTANT * max(size, 1.0):
             each = kept_figure(name, system)
             level = each.factor * float(np.median(values))
-            still.append(f"{each.label}: {0.0 if abs(level) < _STILL else level:.4g}")
+            still.append(f"{each.label}: {0.0 if abs(level) < _CONSTANT else level:.4g}")
         else:
             drawn.append(name)
     if not drawn:
@@ -54,7 +54,7 @@ def varying(
 
 
 def coincident(found: pl.DataFrame, keys: Sequence[str], figures: Sequence[str]) -> list[str]:
-    """Return which configurations have the same line of a figure, a sentence a figure."""
+    """Return sentences on the configurations whose lines coincide, one per figure."""
     said = []
     for name in figures:
         values = found[name].drop_nulls().cast(pl.Float64).to_numpy()
@@ -79,25 +79,22 @@ def coincident(found: pl.DataFrame, keys: Sequence[str], figures: Sequence[str])
     return said
 
 
-def titled(title: str, remark: str, width_in: float) -> str:
-    """Return the title of a figure so many inches wide, with a remark on lines of its own."""
+def full_title(title: str, remark: str, width_in: float) -> str:
+    """Return a title with a remark below, wrapped to the width of the figure in inches."""
     letters = int(_LETTERS_PER_INCH * width_in)
     return "\n".join([plain(title), *textwrap.wrap(plain(remark), letters)]).strip("\n")
 
 
 def is_logarithmic(values: Floats) -> bool:
-    """Tell whether values were spread evenly in their logarithms, and over more than a decade."""
+    """Return whether values are evenly spaced in their logarithms, over a decade or more."""
     if len(values) < 3 or values[0] <= 0.0 or values[-1] < _WIDE * values[0]:
         return False
     steps = np.diff(np.log(values))
     return bool(np.ptp(steps) <= _EVEN * steps.mean())
 
 
-def place_of(axes: Any, key: str, column: pl.Series) -> None:
-    """Label the axis of a parameter along the bottom; logarithmic where its values are spread so.
-
-    An axis that is not linear says so.
-    """
+def label_x(axes: Any, key: str, column: pl.Series) -> None:
+    """Label the x axis with a parameter; use a logarithmic axis if its values are spaced so."""
     values = column.unique().sort().cast(pl.Float64).to_numpy()
     label = parameter_label(key)
     if is_logarithmic(values):
@@ -109,7 +106,7 @@ def place_of(axes: Any, key: str, column: pl.Series) -> None:
 
 
 def mark_ended(axes: Any, places: Floats) -> None:
-    """Put a cross on the lower edge where a flight ended early."""
+    """Draw a cross on the lower edge for each flight that ended early."""
     if not len(places):
         return
     low = np.zeros(len(places))

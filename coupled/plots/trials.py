@@ -1,4 +1,4 @@
-"""The score of blind trials drawn: power against size, and reliability of the probabilities."""
+"""The score of blind trials: power against effect size, and reliability of the probabilities."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _BLUE, _ORANGE = "#0072b2", "#d55e00"
 
 
 def draw_score(score: Score) -> Figure:
-    """Draw the share named against the size of the effect, and stated against true probability.
+    """Draw the share identified against the size of the effect, and a reliability diagram.
 
     Bars are 95 % intervals after Clopper and Pearson.
     """
@@ -26,7 +26,7 @@ def draw_score(score: Score) -> Figure:
     wrong = [row.wrong / row.named.of for row in score.power]
     power.plot(ratios, wrong, "x--", color=_ORANGE, label="wrong")
     power.set(xscale="log", ylim=(-0.03, 1.03), ylabel="share of single effects")
-    power.set_xlabel("stage's residual, with the effect over without (logarithmic)")
+    power.set_xlabel("residual with the effect over without (logarithmic)")
     power.set_xticks([1, 2, 5, 10, 20], ["1", "2", "5", "10", "20"])
     power.minorticks_off()
     legend_above(power, 2, 9.0)
@@ -34,7 +34,7 @@ def draw_score(score: Score) -> Figure:
     _points(reliability, [row.stated for row in bins], [row.true for row in bins], _BLUE, "")
     reliability.plot([0, 1], [0, 1], color="black", linewidth=0.8, linestyle=(0, (1, 1)))
     reliability.set(xlim=(-0.03, 1.03), ylim=(-0.03, 1.03))
-    reliability.set(xlabel="stated probability", ylabel="share that is true")
+    reliability.set(xlabel="stated probability", ylabel="observed frequency")
     for axes in (power, reliability):
         axes.grid(alpha=0.25)
     return figure

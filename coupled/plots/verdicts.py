@@ -1,4 +1,4 @@
-"""A check: each expectation's figure within its bounds."""
+"""The verdicts of a check: each value within its bounds."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _LONGEST = 70
 
 
 def draw_verdicts(checked: CheckResult) -> Figure:
-    """Draw how far each figure is inside its nearest bound, as a share of the bounds."""
+    """Draw the margin of each value to its nearest bound, as a share of the bounds."""
     rows = checked.verdicts
     figure = Figure(figsize=(9.0, 1.4 + 0.3 * max(len(rows), 2)), layout="constrained")
     axes = figure.subplots()
@@ -31,9 +31,7 @@ def draw_verdicts(checked: CheckResult) -> Figure:
     axes.set_yticks(range(len(rows)), [plain(word, _LONGEST) for word in words], fontsize=7)
     axes.set_ylim(len(rows) - 0.5, -0.5)
     axes.axvline(0.0, color="black", linewidth=1.0)
-    axes.set_xlabel(
-        "margin, % of half the bounds' width or of the one bound; × could not be judged"
-    )
+    axes.set_xlabel("margin, % of half the bounds' width or of the one bound; ×: not judged")
     axes.grid(alpha=0.25, axis="x")
     held = sum(verdict.passed for verdict in rows)
     figure.suptitle(f"{held} of {len(rows)} expectations hold", fontsize=12)
@@ -41,7 +39,7 @@ def draw_verdicts(checked: CheckResult) -> Figure:
 
 
 def _share(verdict: Verdict) -> float | None:
-    """Return a margin in per cent of its bounds; None where the figure could not be had."""
+    """Return a margin in per cent of its bounds, or None if the value is not available."""
     if verdict.margin is None or verdict.value is None:
         return None
     least, most = verdict.least, verdict.most

@@ -1,1 +1,1 @@
-"""A command's result as one HTML file that a colleague can be handed."""
+"""Results of commands as single HTML files."""

@@ -1,31 +1,31 @@
-"""The reports of a rig's authority maps and stability, of a plan, and of readings."""
+"""Reports of authority maps, of the stability of a rig, of a reading plan, and of readings."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from coupled.authority.stability.whole import Stability
-from coupled.authority.whole import AuthorityMap
-from coupled.calibration.planned import ReadingsPlan
+from coupled.authority.authoritymap import AuthorityMap
+from coupled.authority.stability.stabilitymap import Stability
 from coupled.calibration.readings import Readings
+from coupled.calibration.readingsplan import ReadingsPlan
 from coupled.display import percent
 from coupled.plots.histories import Figure
 from coupled.plots.maps import draw_feel, draw_losses
+from coupled.plots.raw_readings import draw_raw_readings
 from coupled.plots.saving import svg_text
 from coupled.plots.stability import draw_stability
-from coupled.plots.taken import draw_taken
-from coupled.reports.page import Drawing, Made, Report, Section, Verdict
+from coupled.reports.page import Drawing, Provenance, Report, Section, Verdict
 from coupled.tables.calibration import grids_table, plan_table, readings_table
 from coupled.tables.stability import limits_table
 from coupled.tables.table import Table
 
-_LOSSES = "The share of the asked deflection that is lost, over q̄ and deflection."
+_LOSSES = "The share of the requested deflection that is lost, over q̄ and deflection."
 _FEEL = "Stick force per g and per knot, as specified and with each correction."
-_PLANES = "Growth of the motion over K·G_T: stable where it is negative."
-_TAKEN = "v₁ against the deflection, a colour a gradient set."
+_PLANES = "Growth rate of the motion over K·G_T: stable if negative."
+_READINGS = "v₁ against the deflection, one colour per gradient set."
 
 
-def map_report(found: AuthorityMap, made: Made) -> Report:
+def map_report(found: AuthorityMap, made: Provenance) -> Report:
     """Return the report of the authority maps: the greatest losses, and the maps."""
     rows = []
     for maps in found.losses.values():
@@ -47,12 +47,12 @@ def map_report(found: AuthorityMap, made: Made) -> Report:
 
 
 def draw_map(found: AuthorityMap) -> Figure:
-    """Draw the losses."""
+    """Return the figure of the losses."""
     return draw_losses(found.rig.name, found.losses, found.flown)
 
 
-def stability_report(found: Stability, made: Made) -> Report:
-    """Return the report of a rig's stability: limits and maps."""
+def stability_report(found: Stability, made: Provenance) -> Report:
+    """Return the report of the stability of a rig: limits and maps."""
     sections = (
         Section("Limits at the stiffest gradient", (limits_table(found.limits, found.bob_weight),)),
         Section("Maps", (Drawing(svg_text(draw_planes(found)), _PLANES),)),
@@ -72,12 +72,12 @@ def stability_report(found: Stability, made: Made) -> Report:
 
 
 def draw_planes(found: Stability) -> Figure:
-    """Draw the maps over K·G_T."""
+    """Return the figure of the stability maps over K·G_T."""
     return draw_stability(found.rig, found.by_control)
 
 
-def plan_report(found: ReadingsPlan, made: Made) -> Report:
-    """Return the report of a plan: which readings to take, and what grids would give."""
+def plan_report(found: ReadingsPlan, made: Provenance) -> Report:
+    """Return the report of a plan: the readings to take, and the precision of reading grids."""
     sections = (
         Section("Readings to take", (plan_table(found),)),
         Section("Grids", (grids_table(found),)),
@@ -88,11 +88,11 @@ def plan_report(found: ReadingsPlan, made: Made) -> Report:
     return Report("Plan", found.control, Verdict(said), sections, settings, made)
 
 
-def readings_report(found: Readings, made: Made) -> Report:
-    """Return the report of readings: a row each, and v₁ against the deflection."""
+def readings_report(found: Readings, made: Provenance) -> Report:
+    """Return the report of readings: one row each, and v₁ against the deflection."""
     sections = (
         Section("Readings", (readings_table(found),)),
-        Section("Figure", (Drawing(svg_text(draw_taken(found)), _TAKEN),)),
+        Section("Figure", (Drawing(svg_text(draw_raw_readings(found)), _READINGS),)),
     )
     said = repr(found).removeprefix("Readings(").removesuffix(")") + "."
     settings = (("readings", str(len(found.row))),)

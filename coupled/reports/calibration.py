@@ -1,4 +1,4 @@
-"""The report of a calibration: the figures with their errors, and the readings that gave them."""
+"""The report of a calibration: results with intervals, and the readings."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from coupled.display import System, in_system
 from coupled.plots.readings import draw_readings
 from coupled.plots.saving import svg_text
 from coupled.record.channels import unit_of
-from coupled.reports.page import Drawing, Made, Report, Section, Text, Verdict
+from coupled.reports.page import Drawing, Provenance, Report, Section, Text, Verdict
 from coupled.tables.calibration import readings_table, results_table
 
-_SHOWN = "The readings, and the lines through them that S1, K and S3 are (the report's figure 4)."
+_SHOWN = "The readings, and the fitted lines of S1, K and S3 (figure 4 of the report)."
 
 
 def calibration_report(
@@ -19,10 +19,10 @@ def calibration_report(
     rig: str,
     readings: str,
     date: str,
-    made: Made,
+    made: Provenance,
     system: System = "si",
 ) -> Report:
-    """Return the report; `rig`, `readings` and `date` as the user names them."""
+    """Return the report; `rig`, `readings` and `date` are names as given by the user."""
     d = unit_of(found.control)
     read = readings_table(found.readings, d, system, found.line.residual)
     sections = (

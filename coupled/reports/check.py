@@ -1,4 +1,4 @@
-"""The report of a check: each expectation, what was found, and by how much it holds."""
+"""The report of a check: each expectation with its value, bounds and margin."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ from itertools import groupby
 
 from coupled.campaign.check import CheckResult
 from coupled.campaign.verdict import Verdict as Judged
-from coupled.campaign.verdict import finding
+from coupled.campaign.verdict import verdict_line
 from coupled.display import System
-from coupled.reports.page import Made, Report, Section, Verdict
+from coupled.reports.page import Provenance, Report, Section, Verdict
 from coupled.tables.campaign import verdict_tables
 
 
-def check_report(checked: CheckResult, made: Made, system: System = "si") -> Report:
-    """Return the report: a table for each case, in a system's units; the verdict names failures."""
+def check_report(checked: CheckResult, made: Provenance, system: System = "si") -> Report:
+    """Return the report: a table per case, in the units of `system`; the verdict lists failures."""
     runs = list(dict.fromkeys(verdict.run for verdict in checked.verdicts))
     groups = groupby(checked.verdicts, key=lambda v: v.run)
     sections = [Section(run, tuple(verdict_tables(list(group), system))) for run, group in groups]
@@ -33,4 +33,4 @@ def _remark(verdict: Judged, system: System) -> str:
     where = f"{verdict.run}, {verdict.case}: {verdict.what} [{verdict.configuration}]"
     at = "" if verdict.at_s is None else f", at {verdict.at_s:.4g} s"
     why = f". Why: {verdict.why}" if verdict.why else ""
-    return f"{where}: {finding(verdict, system)}{at}{why}"
+    return f"{where}: {verdict_line(verdict, system)}{at}{why}"

@@ -1,4 +1,4 @@
-"""The report of a comparison: what each configuration loses, and the flights that show it."""
+"""The report of a comparison: the authority lost in each configuration, and the flights."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from coupled.display import System
 from coupled.flight.manoeuvre import Manoeuvre
 from coupled.plots.flights import draw_comparison
 from coupled.plots.saving import svg_text
-from coupled.reports.page import Drawing, Made, Report, Section, Verdict
+from coupled.reports.page import Drawing, Provenance, Report, Section, Verdict
 from coupled.tables.flights import comparison_table
 
 _SHOWN = (
-    "Surface command, motion, force against true deflection, and what is lost. Gray: as specified."
+    "Surface command, motion, force against true deflection, and authority lost. Gray: specified."
 )
 _STEPS = "Steps of the modifying force from frame to frame, which the hand feels."
 
 
-def comparison_report(flights: Sequence[Flight], made: Made, system: System = "si") -> Report:
-    """Return the report: a table and a figure a case, or one of all where each is flown once."""
+def comparison_report(flights: Sequence[Flight], made: Provenance, system: System = "si") -> Report:
+    """Return the report: table and figure per case, or one of all if each has one flight."""
     groups, once = tabulated(flights), flown_once(cases_of(flights))
     run = flights[0].manoeuvre
     sections = [
@@ -47,7 +47,7 @@ def comparison_report(flights: Sequence[Flight], made: Made, system: System = "s
 
 
 def _verdict(flights: Sequence[Flight], system: System) -> Verdict:
-    """Return what each configuration loses over the cases, and what the hand feels."""
+    """Return the authority lost and the felt gradient of each configuration over all cases."""
     lost, felt = [], []
     for configuration in dict.fromkeys(f.configuration for f in flights):
         if configuration == "rigid":
@@ -72,7 +72,7 @@ def _verdict(flights: Sequence[Flight], system: System) -> Verdict:
 
 
 def _span(values: Iterable[float], decimals: int) -> str:
-    """Return the least and the greatest of some figures, or the one that all are."""
+    """Return the least and the greatest value, or the single value if all are equal."""
     there = [value for value in values if math.isfinite(value)]
     if not there:
         return "–"
@@ -82,7 +82,7 @@ def _span(values: Iterable[float], decimals: int) -> str:
 
 
 def _settings(run: Manoeuvre) -> Iterable[tuple[str, str]]:
-    """Yield what the flights share."""
+    """Yield the settings that the flights share."""
     rig = run.rig
     yield "run", run.name
     yield "rig", rig.name

@@ -1,4 +1,4 @@
-"""The report of a diagnosis: what is wrong, how sure that is, and the figures that show it."""
+"""The report of a diagnosis: verdict, tables and figures."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from collections.abc import Iterator
 from coupled.display import System
 from coupled.gap.findings.diagnosis import Diagnosis
 from coupled.gap.findings.summary import sentences, summary_in
-from coupled.plots.gaps import drawn_parts
+from coupled.plots.gaps import draw_parts
 from coupled.plots.saving import svg_text
-from coupled.reports.page import Drawing, Made, Report, Section, Verdict
+from coupled.reports.page import Drawing, Provenance, Report, Section, Verdict
 from coupled.tables.gaps import (
     curve_table,
     effects_table,
@@ -33,11 +33,11 @@ _CAPTIONS = {
 
 
 def diagnosis_report(
-    whole: Diagnosis, title: str, made: Made, with_power: bool = False, system: System = "si"
+    whole: Diagnosis, title: str, made: Provenance, with_power: bool = False, system: System = "si"
 ) -> Report:
-    """Return the report; with the least sizes that would have shown, where they are asked for."""
+    """Return the report; `with_power` adds the least detectable size of each effect."""
     sections = [Section(head, tables) for head, tables in _tables(whole, with_power, system)]
-    for part, drawn in drawn_parts(whole, system).items():
+    for part, drawn in draw_parts(whole, system).items():
         figures = (Drawing(svg_text(each), _CAPTIONS[name]) for name, each in drawn.items())
         head = f"Figures: {part}" if len(whole.parts) > 1 else "Figures"
         sections.append(Section(head, tuple(figures)))
@@ -61,7 +61,7 @@ def _verdict(whole: Diagnosis, system: System) -> Verdict:
 def _tables(
     whole: Diagnosis, with_power: bool, system: System
 ) -> Iterator[tuple[str, tuple[Table, ...]]]:
-    """Yield the head and the tables of each section."""
+    """Yield the heading and the tables of each section."""
     if whole.effects:
         keys = keys_table(whole.effects, system)
         yield "Effects found", (effects_table(whole.effects, whole.budget, system), keys)

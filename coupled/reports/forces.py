@@ -1,4 +1,4 @@
-"""The force document: cover, table of checks, and each test with its conditions and its figure."""
+"""The force document: cover, table of checks, and each test with its conditions and figure."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from coupled.reports.page import (
     Block,
     Cover,
     Drawing,
-    Made,
+    Provenance,
     Report,
     Section,
     Verdict,
@@ -29,7 +29,7 @@ from coupled.tables.table import Table
 from coupled.version import __version__
 
 _SIGNED = ("Prepared", "Checked", "Accepted")
-_NAMED = 8  # checks that fail, on the first page
+_NAMED = 8  # failed checks listed on the first page
 Fits = Mapping[ControlName, tuple[CalibrationResult, str] | None]
 
 
@@ -37,10 +37,10 @@ def force_report(
     documents: Sequence[Documentation],
     fits: Fits,
     issue: Issue,
-    made: Made,
+    made: Provenance,
     system: System = "si",
 ) -> Report:
-    """Return the force document of a rig's controls, in the units of a system."""
+    """Return the force document of the controls of a rig, in the units of `system`."""
     tests = [
         (found, test) for found in documents for test in feel_tests(found, issue.reference, system)
     ]
@@ -61,9 +61,9 @@ def force_report(
 
 
 def force_summary(
-    documents: Sequence[Documentation], issue: Issue, made: Made, system: System = "si"
+    documents: Sequence[Documentation], issue: Issue, made: Provenance, system: System = "si"
 ) -> Report:
-    """Return the table of checks alone."""
+    """Return the report with the table of checks only."""
     tests = [test for found in documents for test in feel_tests(found, issue.reference, system)]
     rig = documents[0].rig
     sections = (Section("Checks", (_checks(tests, system),)),)
@@ -97,7 +97,7 @@ def _checks(tests: Sequence[FeelTest], system: System) -> Table:
 
 
 def _test(found: Documentation, test: FeelTest, system: System) -> Section:
-    """Return a test's own page: conditions, tolerances, results, figure."""
+    """Return the page of one test: conditions, tolerances, results, figure."""
     alone = replace(found, conditions=(test.condition,))
     draw = draw_static_checks if test.kind == "static" else draw_releases
     place = pressure_in(test.condition.pressure_Pa, system)
@@ -114,9 +114,9 @@ def _test(found: Documentation, test: FeelTest, system: System) -> Section:
 def _beside(
     found: Documentation, fit: tuple[CalibrationResult, str] | None, system: System
 ) -> Section:
-    """Return what documents a control beside its tests."""
+    """Return the further figures of a control: forces, deflections, and the calibration."""
     return Section(
-        f"{found.control}, beside the tests", tuple(_drawn(found, fit, system)), own_page=True
+        f"{found.control}, further figures", tuple(_drawn(found, fit, system)), own_page=True
     )
 
 
@@ -126,7 +126,7 @@ def _drawn(
     name = found.control
     forces = "Force against true deflection, swept both ways, with and without compensation."
     yield Drawing(svg_text(draw_forces(found, system)), f"{name}: {forces}")
-    computed = "Computed against true deflection, and what the host's estimate lacks."
+    computed = "Computed against true deflection, and the error of the host's estimate."
     yield Drawing(svg_text(draw_deflections(found, system)), f"{name}: {computed}")
     if fit is not None:
         shown = f"Readings and fit (the report's figure 4), from {fit[1]}."

@@ -1,4 +1,4 @@
-"""Matplotlib's SVG made fit to stand within a page of HTML, beside others."""
+"""Conversion of matplotlib SVG files to SVG elements that can be embedded in an HTML page."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ _REFERENCE = re.compile(r"url\(#")
 
 
 def inline_svg(text: str, prefix: str, label: str) -> str:
-    """Return an SVG file's picture without what only a file needs.
+    """Return the SVG element of a file, with unique ids and without metadata, styles and comments.
 
-    Each id begins with `prefix`, so that no two figures of a page share one; `label` is for those
-    who hear the page. Metadata, styles and comments go: they would act on the page, or say when.
+    All ids begin with `prefix`, so that figures on one page do not share ids. `label` is the text
+    for screen readers. Styles would apply to the whole page; metadata contain the date.
     """
     root = ElementTree.fromstring(text)
     for parent in list(root.iter()):
@@ -33,9 +33,9 @@ def inline_svg(text: str, prefix: str, label: str) -> str:
 
 
 def _rename(element: ElementTree.Element, prefix: str) -> None:
-    """Give ids, and what refers to them, a prefix."""
+    """Add a prefix to the ids of an element and to the references to them."""
     target = element.attrib.pop(f"{{{_XLINK}}}href", None)
-    if target is not None:  # a part of the picture, or a raster image within it
+    if target is not None:  # a reference within the file, or an embedded raster image
         inside = target.startswith("#")
         element.set("href", f"#{prefix}{target[1:]}" if inside else target)
     for name, value in element.attrib.items():

@@ -1,7 +1,7 @@
-"""A report as data, and as one HTML file: verdict, tables, figures, and what made it.
+"""A report as data, and as one HTML file: verdict, tables, figures, and provenance.
 
-The file stands alone: figures are inline SVG, nothing is loaded from anywhere, and a policy in its
-head forbids it. The same results give the same bytes. It prints on A4 and on Letter.
+The file is self-contained: figures are inline SVG, nothing is loaded, and a content security policy
+forbids it. The same results give the same bytes. It prints on A4 and on Letter.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _UNIT = re.compile(r"(?<=\d) (?=(%|N|m|mm|cm|s|ms|Hz|kPa|Pa|V|kt|lb|in|ft|°)\b|
 
 @dataclass(frozen=True)
 class Drawing:
-    """A figure as matplotlib's SVG, with what it shows."""
+    """A figure as matplotlib's SVG, with a caption."""
 
     kind: ClassVar[str] = "drawing"
     svg: str
@@ -35,7 +35,7 @@ class Drawing:
 
 @dataclass(frozen=True)
 class Text:
-    """Sentences, a paragraph each."""
+    """Sentences, one paragraph each."""
 
     kind: ClassVar[str] = "text"
     lines: tuple[str, ...]
@@ -46,7 +46,7 @@ Block = Table | Drawing | Text
 
 @dataclass(frozen=True)
 class Section:
-    """A part of a report under a head; `own_page`: it begins a page when printed."""
+    """A section of a report with a heading; `own_page` starts a new page in print."""
 
     head: str
     blocks: tuple[Block, ...]
@@ -55,7 +55,7 @@ class Section:
 
 @dataclass(frozen=True)
 class Verdict:
-    """What a reader is to take away, in a sentence, and what qualifies it."""
+    """The main result in one sentence, and remarks on it."""
 
     text: str
     tone: Tone = "plain"
@@ -64,7 +64,7 @@ class Verdict:
 
 @dataclass(frozen=True)
 class InputFile:
-    """A file that went in: its name, its hash, and its text where people read it."""
+    """An input file: its name, its hash, and its text if it is a text file."""
 
     name: str
     sha256: str
@@ -72,8 +72,8 @@ class InputFile:
 
 
 @dataclass(frozen=True)
-class Made:
-    """What made a report: the command, the versions of what ran, and the files that went in."""
+class Provenance:
+    """The provenance of a report: the command, software versions, and input files."""
 
     command: str
     versions: tuple[tuple[str, str], ...]
@@ -82,7 +82,7 @@ class Made:
 
 @dataclass(frozen=True)
 class Cover:
-    """The first page of a document that is filed: what it is of, in rows of name and value."""
+    """The cover of a document: its subject, in rows of name and value."""
 
     rows: tuple[tuple[str, str], ...]
     signatures: tuple[str, ...] = ()
@@ -90,14 +90,14 @@ class Cover:
 
 @dataclass(frozen=True)
 class Report:
-    """A command's result for people: `kind` is what was done, `title` of what."""
+    """The report of a command; `kind` is the kind of analysis, `title` its subject."""
 
     kind: str
     title: str
     verdict: Verdict
     sections: tuple[Section, ...]
     settings: tuple[tuple[str, str], ...]
-    made: Made
+    made: Provenance
     cover: Cover | None = None
 
 
@@ -108,10 +108,10 @@ def render(report: Report) -> str:
 
 
 def render_part(report: Report, most: int) -> str:
-    """Return a report's verdict and its first `most` sections as a part of another page.
+    """Return the verdict and the first `most` sections of a report as a part of another page.
 
-    Its styles act within it only. Its figures' ids are of their content: several parts on one page
-    do not share them.
+    The styles apply within the part only. The ids of figures are hashes of their content, so that
+    several parts on one page do not share ids.
     """
     text = "".join(b.svg for s in report.sections for b in s.blocks if isinstance(b, Drawing))
     prefix = f"c{hashlib.sha256(text.encode()).hexdigest()[:12]}"
@@ -122,7 +122,7 @@ def render_part(report: Report, most: int) -> str:
 def _blocks(
     report: Report, section: Section, prefix: str = ""
 ) -> Iterator[tuple[Block, int, Markup]]:
-    """Yield a section's blocks; with each figure its number in the report, and its SVG."""
+    """Yield the blocks of a section, with the number and the SVG of each figure."""
     drawings = [b for s in report.sections for b in s.blocks if isinstance(b, Drawing)]
     for block in section.blocks:
         if isinstance(block, Drawing):
@@ -133,14 +133,14 @@ def _blocks(
 
 
 def typeset(text: str) -> str:
-    """Return text with a true minus before numbers, and no line's end between number and unit."""
+    """Return text with minus signs before numbers, and no line break between number and unit."""
     return _UNIT.sub("\u00a0", _MINUS.sub("−", text))
 
 
 def _shown(value: object) -> object:
-    """Return what a template shows: a user's text without what a browser would act on.
+    """Return a value as a template shows it, without characters that a browser would interpret.
 
-    Control characters, and marks that turn the direction of writing, become `?`.
+    Control characters, and characters that change the direction of writing, become `?`.
     """
     return printable(value) if type(value) is str else value
 
@@ -155,6 +155,6 @@ def _templates() -> Environment:
         lstrip_blocks=True,
         finalize=_shown,
     )
-    # Markup, so that `_shown` leaves its spaces that do not break.
+    # Markup, so that `_shown` keeps its non-breaking spaces.
     environment.filters["typeset"] = lambda text: escape(typeset(printable(text)))
     return environment

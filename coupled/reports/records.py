@@ -1,4 +1,4 @@
-"""The reports of a record, of one flight, and of a nominal rig fitted to records."""
+"""The reports of a record, of a flight, and of a nominal rig fitted to records."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from coupled.plots.fits import draw_fit
 from coupled.plots.histories import Figure, draw_record
 from coupled.plots.saving import svg_text
 from coupled.record.record import Record
-from coupled.reports.page import Drawing, Made, Report, Section, Text, Verdict
+from coupled.reports.page import Drawing, Provenance, Report, Section, Text, Verdict
 from coupled.tables.flights import comparison_table, record_table
 from coupled.tables.gaps import channels_table, numbers_table
 
 _HISTORY = "The record over time."
-_FITTED = "Each number as found over as filed, with its 95 % interval."
+_FITTED = "Each fitted over filed value, with its 95 % interval."
 
 
-def record_report(record: Record, made: Made) -> Report:
+def record_report(record: Record, made: Provenance) -> Report:
     """Return the report of a record: its time histories, and the range of each channel."""
     sections = (
         Section("Time histories", (Drawing(svg_text(draw_record(record)), _HISTORY),)),
@@ -33,8 +33,8 @@ def record_report(record: Record, made: Made) -> Report:
     return Report("Record", "Record", verdict, sections, (("rows", str(len(record))),), made)
 
 
-def flight_report(flight: Flight, made: Made) -> Report:
-    """Return the report of one flight: its figures, and its time histories."""
+def flight_report(flight: Flight, made: Provenance) -> Report:
+    """Return the report of a flight: its figures of merit, and its time histories."""
     table = comparison_table([flight])
     history = Drawing(svg_text(draw_flight(flight)), _HISTORY)
     sections = (Section("Figures", (table,)), Section("Time histories", (history,)))
@@ -54,12 +54,12 @@ def flight_report(flight: Flight, made: Made) -> Report:
 
 
 def draw_flight(flight: Flight) -> Figure:
-    """Draw a flight's time histories."""
+    """Return the figure of the time histories of a flight."""
     return draw_record(flight.record, f"{flight.manoeuvre.label}, {flight.configuration}")
 
 
-def fit_report(found: NominalFit, made: Made) -> Report:
-    """Return the report of a fitted rig: its numbers, and how far each channel stays off."""
+def fit_report(found: NominalFit, made: Provenance) -> Report:
+    """Return the report of a fitted rig: its parameters, and the residual of each channel."""
     sections = [
         Section("Numbers", (numbers_table(found.numbers),)),
         Section("Fit", (Drawing(svg_text(draw_fit(found)), _FITTED),)),
@@ -67,7 +67,7 @@ def fit_report(found: NominalFit, made: Made) -> Report:
     ]
     lines = [f"Not distinguished: {one.words}." for one in found.alike]
     lines += [f"Not determined: {key}." for key in found.unknown]
-    lines += [f"At the end of what it may be: {n.key}." for n in found.numbers if n.at_bound]
+    lines += [f"At its bound: {n.key}." for n in found.numbers if n.at_bound]
     if lines:
         sections.insert(1, Section("What the records do not determine", (Text(tuple(lines)),)))
     known = len(found.numbers) - len(found.unknown)

@@ -1,4 +1,4 @@
-"""The reports of a rig, of JSBSim's models, and of a rig exported to JSBSim."""
+"""The reports of a rig, of JSBSim models, and of a rig exported to JSBSim."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ from coupled.exporting.write import Export
 from coupled.plots.rigs import draw_rig
 from coupled.plots.saving import svg_text
 from coupled.record.channels import unit_of
-from coupled.reports.page import Drawing, Made, Report, Section, Text, Verdict
+from coupled.reports.page import Drawing, Provenance, Report, Section, Text, Verdict
 from coupled.rig.equations import uncompensated_loss
 from coupled.rig.parameters import Control
 from coupled.rig.rig import Rig
+from coupled.surveying.modelsurvey import Survey
 from coupled.surveying.terms import ModelTerms
-from coupled.surveying.whole import Survey
 from coupled.tables.flights import export_table
 from coupled.tables.rigs import models_table, terms_table
 from coupled.tables.table import Table
 
-_SHOWN = "G_T over q̄, and the share that the bend takes where the host corrects nothing."
+_SHOWN = "G_T over q̄, and the share lost to compliance if the host corrects nothing."
 
 
-def rig_report(rig: Rig, made: Made) -> Report:
+def rig_report(rig: Rig, made: Provenance) -> Report:
     """Return the report of a rig: a table of its controls, and their gradients."""
     heads = ("", *rig.controls)
     columns = [list(_numbers(name, control)) for name, control in rig.controls.items()]
@@ -46,7 +46,7 @@ def rig_report(rig: Rig, made: Made) -> Report:
 
 
 def _numbers(name: str, control: Control) -> Iterator[tuple[str, str]]:
-    """Yield a control's main numbers, each with its label and unit."""
+    """Yield the main parameters of a control, each with its label and unit."""
     d, loader, host = unit_of(name), control.loader, control.compensation
     gradients = control.schedule.gradients
     yield "travel", f"±{control.travel:.4g} {d}"
@@ -63,8 +63,8 @@ def _numbers(name: str, control: Control) -> Iterator[tuple[str, str]]:
     yield "  corrects", ", ".join(word for word, on in words.items() if on) or "nothing"
 
 
-def survey_report(found: Survey, made: Made) -> Report:
-    """Return the report of JSBSim's models: a row each."""
+def survey_report(found: Survey, made: Provenance) -> Report:
+    """Return the report of a survey of JSBSim models: one row each."""
     table = models_table(found.models)
     trimmed = [one for one in found if one.flight is not None]
     led = sum(bool(one.controls) for one in trimmed)
@@ -73,22 +73,22 @@ def survey_report(found: Survey, made: Made) -> Report:
     return Report("Models", "JSBSim", Verdict(said), (Section("Models", (table,)),), settings, made)
 
 
-def terms_report(found: ModelTerms, made: Made) -> Report:
-    """Return the report of a model's terms: a row each."""
+def terms_report(found: ModelTerms, made: Provenance) -> Report:
+    """Return the report of the terms of a model: one row each."""
     said = f"{len(found)} named functions; shares in {found.flown}."
     settings = (("model", found.model),)
     section = Section("Terms", (terms_table(found),))
     return Report("Terms", found.model, Verdict(said), (section,), settings, made)
 
 
-def export_report(found: Export, made: Made) -> Report:
-    """Return the report of an export: how far each flight by JSBSim alone is from our own."""
+def export_report(found: Export, made: Provenance) -> Report:
+    """Return the report of an export: the differences of JSBSim's flights from our own."""
     sections = [Section("Flights by JSBSim alone", (export_table(found),))]
     lines = [f"Left out: {line}" for line in found.left]
     lines += [f"By the scripts only: {line}" for line in found.scripted]
     if lines:
         sections.append(Section("What the export lacks", (Text(tuple(lines)),)))
-    near = "are as near to our own as they have to be" if found.within else "are too far off"
+    near = "are within the limits of our own" if found.within else "are outside the limits"
     said = f"{len(found.files)} files; {len(found.beside)} flights {near}."
     settings = (("rig", found.rig.name), ("steps of the loader a run", str(found.substeps)))
     verdict = Verdict(said, "good" if found.within else "bad")

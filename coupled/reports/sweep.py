@@ -1,4 +1,4 @@
-"""The report of a sweep: what was varied, how the figures lie over the flights."""
+"""The report of a sweep: the varied parameters, and the distribution of the results."""
 
 from __future__ import annotations
 
@@ -10,26 +10,24 @@ from coupled.campaign.sweep import SweepResult
 from coupled.display import System, parameter_label
 from coupled.plots.results import draw_result
 from coupled.plots.saving import svg_text
-from coupled.reports.page import Drawing, Made, Report, Section, Verdict
+from coupled.reports.page import Drawing, Provenance, Report, Section, Verdict
 from coupled.tables.campaign import flown_values, indices_table, spread_table, survival_table
 from coupled.tables.table import Table
 
 _LISTED = 20  # flights that ended early
 
 
-def sweep_report(found: SweepResult, made: Made, system: System = "si") -> Report:
-    """Return the report: figure, distribution, indices or boundaries, and what ended early."""
+def sweep_report(found: SweepResult, made: Provenance, system: System = "si") -> Report:
+    """Return the report: figure, distribution, indices or boundaries, and flights ended early."""
     asked = found.plan.sweep
     sections = [
         Section("Varied", (_varied(found),)),
-        Section(
-            "How the figures lie over the flights", (spread_table(found.table, asked.keep, system),)
-        ),
+        Section("Distribution over the flights", (spread_table(found.table, asked.keep, system),)),
         Section("Figure", (Drawing(svg_text(draw_result(found, system)), _caption(found)),)),
     ]
     if found.limits:
         sections.insert(
-            0, Section("What is survived", (survival_table(found.limits, found.numeric_keys[0]),))
+            0, Section("Survival", (survival_table(found.limits, found.numeric_keys[0]),))
         )
     if found.indices:
         sections.insert(0, Section("Shares of the variance", (indices_table(found.indices),)))
@@ -87,7 +85,7 @@ def _ended(ended: pl.DataFrame) -> Table:
 
 def _caption(found: SweepResult) -> str:
     if found.indices:
-        return "What each parameter does to each figure, alone and with others."
+        return "Sobol indices of each parameter for each figure."
     if found.limits:
-        return "What each configuration survives, and where the boundary lies."
-    return "Each figure that varies, against what was varied."
+        return "Survived flights of each configuration, and the boundary."
+    return "Each figure that varies, against the varied parameters."

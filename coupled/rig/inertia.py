@@ -7,8 +7,8 @@ faster and with less damping than specified: the frequency by 1/√(1 − K·G_T
 √(1 − K·G_T). With both factors 1/(1 − K·G_T) they are as specified. The remaining error of a
 release is the bend's springing back: the grip is at δ·(1 − K·G_T) at once, and at rest. The lead T
 on the force gives the loader the speed of the specified motion there, by an impulse T·F when F ends
-(`calibration/letgo`). All three are in a table over the gradient of the schedule, linear between
-its rows and constant beyond, and are set at each frame.
+(`calibration/releaseschedule`). All three are in a table over the gradient of the schedule, linear
+between its rows and constant beyond, and are set at each frame.
 """
 
 from __future__ import annotations

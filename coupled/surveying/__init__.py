@@ -1,1 +1,1 @@
-"""The JSBSim models that are here: whether they trim, how their controls move, a first rig."""
+"""The available JSBSim models: trim, motion of the controls, and draft rigs."""

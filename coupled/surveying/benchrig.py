@@ -1,7 +1,7 @@
-"""A first rig without an aircraft: a control by itself, from what its owner knows or a log of it.
+"""A draft rig without an aircraft: one control, from the user's values or a log.
 
-Answers are in SI or in US units, a bare number or one with its unit, as `12.5lbf/in`. What nobody
-gave is the light aircraft's of `draft`, and listed as a guess.
+Values are in SI or in US units, a bare number or one with its unit, as `12.5lbf/in`. Missing values
+are those of the light aircraft of `draft`, and are listed as guesses.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _YES, _NO = ("yes", "y", "true"), ("no", "n", "false")
 
 @dataclass(frozen=True)
 class Question:
-    """A question on a control: its name, its words, its SI unit, and the field of the rig."""
+    """A question on a control: its name, its text, its SI unit, and the field of the rig."""
 
     name: str
     words: str
@@ -36,7 +36,7 @@ class Question:
 
 
 def questions(control: ControlName) -> dict[str, Question]:
-    """Return the questions on a control, by name, in their order."""
+    """Return the questions on a control by name, in order."""
     d = unit_of(control)
     mass = "kg" if d == "m" else "N·s²/rad"
     asked = (
@@ -52,9 +52,9 @@ def questions(control: ControlName) -> dict[str, Question]:
 
 
 def answer(text: str, asked: Question, system: System) -> float:
-    """Return an answer in SI: a bare number in the system's unit, or a number with its own.
+    """Return an answer in SI: a bare number in the system's unit, or a number with a unit.
 
-    Raises InputError for what is none, or is of another quantity.
+    Raises InputError for an answer that is not a number or has the unit of another quantity.
     """
     shown = in_system(asked.unit, system)
     found = _NUMBER.fullmatch(text)
@@ -85,14 +85,14 @@ def answer(text: str, asked: Question, system: System) -> float:
 
 
 def yes(text: str) -> bool:
-    """Return an answer to whether there is a servo. Raises InputError for neither yes nor no."""
+    """Return whether there is a servo. Raises InputError for an answer that is not yes or no."""
     if text.lower() not in (*_YES, *_NO):
         raise InputError("new rig", "servo", f"{text!r} is neither yes nor no")
     return text.lower() in _YES
 
 
 def split_answers(words: list[str], control: ControlName) -> dict[str, str]:
-    """Return NAME=VALUE words as answers by name. Raises InputError for a name that is none."""
+    """Return NAME=VALUE words as answers by name. Raises InputError for an unknown name."""
     known = [*questions(control), "servo"]
     answers = {}
     for word in words:
@@ -107,7 +107,7 @@ def split_answers(words: list[str], control: ControlName) -> dict[str, str]:
 
 
 def guesses(control: ControlName, servo: bool) -> dict[str, float]:
-    """Return what is taken where nobody knows, in SI, by name."""
+    """Return the default values, in SI, by name."""
     guess = kind_of(0.0).controls[control]
     bend = 0.0
     if servo:
@@ -124,7 +124,7 @@ def guesses(control: ControlName, servo: bool) -> dict[str, float]:
 
 
 def found_in(log: LogNumbers) -> tuple[dict[str, float], set[str]]:
-    """Return a log's numbers by name, and the names of those that it determines."""
+    """Return the numbers of a log by name, and the names of those that it determines."""
     numbers = {
         "travel": log.travel,
         "gradient": log.gradient,
@@ -149,9 +149,9 @@ def bench_rig(
 ) -> str:
     """Return the text of a rig file without an aircraft.
 
-    `given` are numbers in SI by name, which its owner knows. Those of a `log` come next, from the
-    file `source`, whose rows are at `rate_Hz`; the others are guesses. The gradient is the same at
-    any q̄: one row of a table.
+    `given` are known values in SI by name. Further values are from a `log`, whose file is `source`
+    with rows at `rate_Hz`; the others are guesses. The gradient is the same at any q̄: one row of a
+    table.
     """
     asked = questions(control)
     values, known = guesses(control, servo), set(given)

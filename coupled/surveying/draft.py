@@ -1,9 +1,9 @@
-"""A first rig for a model: a commented rig file that lists every guess as one.
+"""A draft rig for a model: a commented rig file in which all guesses are listed.
 
-What is known is found: where the model trims, which controls a rig can lead, how fast and how slow
-it flies. The rest are guesses of three classes by the empty mass, taken from the shipped rigs of a
-light aircraft, a trainer and a jet transport. The column's gradient grows with q̄, as a reversible
-control's does, up to a greatest force at full travel; K is that of Cleveland's report.
+Computed from the model are its trim, the controls that a rig can move, and its speed range. The
+rest are guesses of three classes by empty mass, from the shipped rigs of a light aircraft, a
+trainer and a jet transport. The column's gradient increases with q̄, as for a reversible control,
+up to a greatest force at full travel; K is that of Cleveland's report.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ HOW_TO_SETTLE = (
 
 @dataclass(frozen=True)
 class Hardware:
-    """What is guessed of one control: SI, at the grip; on a wheel at the rim, by the angle."""
+    """Guessed values of one control: SI, at the grip; for a wheel at the rim, by the angle."""
 
     travel: float
     mass: float
@@ -80,15 +80,15 @@ _KINDS = (
 
 
 def kind_of(mass_kg: float) -> Kind:
-    """Return the class whose numbers are guessed for an empty mass; 0 for an unknown one."""
+    """Return the class of an empty mass; 0 stands for an unknown mass."""
     return next(kind for kind in _KINDS if mass_kg <= kind.most_kg)
 
 
 def draft(found: Surveyed, name: str, folder: str = "", airframe_only: bool = False) -> str:
-    """Return the text of a first rig file for a surveyed model that trims.
+    """Return the text of a draft rig file for a surveyed model that trims.
 
     `folder` is the folder of models of a user's own model, relative to the rig file.
-    `airframe_only` leaves out the controls.
+    `airframe_only` omits the controls.
     """
     if airframe_only:
         head = [f"# {found.model}: an aircraft without controls, written by `coupled new rig`."]

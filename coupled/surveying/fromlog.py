@@ -1,6 +1,6 @@
-"""A control's first numbers from a log of it: its static line and its free response, at once.
+"""Estimates of a control's parameters from a log, by its static line and its free response.
 
-The force on the grip is taken for that of a mass on a spring with friction and breakout,
+The control is modelled as a mass on a spring with friction and breakout,
 
     F = m·ẍ + c·ẋ + G·x + F_f·sgn(ẋ) + F_bo·sgn(x) + F_0,
 
@@ -30,7 +30,7 @@ from coupled.record.samples import check_samples
 Floats = NDArray[np.float64]
 _WINDOWS_s = (0.2, 0.8)  # short ones for mass and damping, long ones for the gradient
 _SMOOTHED_s = 0.04  # before the rate's sign is taken
-_MOVES = 0.1  # of the median rate: a slower control may stick, and friction is below F_f
+_MOVES = 0.1  # of the median rate: a slower control may stick, with friction below F_f
 _STILL = 1e-3  # of the greatest rate
 _LEAST_WINDOWS = 40
 _SURE = 0.1  # of a number, or of the greatest force for friction and breakout: 2 standard errors
@@ -39,7 +39,7 @@ _BENT = 1e-3  # of the travel: a smaller difference of δ and δc is no bend
 
 @dataclass(frozen=True)
 class LogNumbers:
-    """What a log gives of a control: SI, d being m or rad.
+    """The parameters of a control from a log: SI, d being m or rad.
 
     `travel` is the greatest deflection in it, `gradient` that at the grip. `sure` are the names of
     those whose 95 % interval is within a tenth: `mass`, `damping`, `gradient`, `breakout_N`,
@@ -57,11 +57,11 @@ class LogNumbers:
 
 
 def numbers_from_log(record: Record, control: ControlName, file: object) -> LogNumbers:
-    """Return a control's numbers by a record of it that was moved slowly and let go.
+    """Return a control's parameters from a record of slow motion and of releases.
 
-    The record needs the force, and the deflection or the computed one. Raises InputError, which
-    names `file`, where it has not both, a cell is empty, a deflection is in
-    another unit, or the control hardly moves.
+    The record needs the force, and the deflection or the computed one. Raises InputError with
+    `file` if one is missing, a cell is empty, a deflection is in another unit, or the control
+    hardly moves.
     """
     force_name, deflections = channel(control, "force"), ("deflection", "computed")
     names = [channel(control, each) for each in deflections]
@@ -116,7 +116,7 @@ def _fitted(
     rate = np.gradient(calm, h)
     speed = np.abs(rate)
     moving = speed > _MOVES * float(np.median(speed[speed > _STILL * np.max(speed)]))
-    # The mean of a sign over a sample's time, so that a step between two samples counts in part.
+    # The mean sign over a sampling interval: a step between two samples counts in part.
     side = np.clip(2.0 * x / np.maximum(np.abs(np.gradient(x)), 1e-9 * travel), -1.0, 1.0)
     signals = (np.sign(rate), side)
     rows = list(_windows(h, x, force, signals, moving))
@@ -146,7 +146,7 @@ def _windows(
     signals: tuple[Floats, Floats],
     moving: NDArray[np.bool_],
 ) -> Iterator[list[float]]:
-    """Yield a row of the least squares a window: m, c, G, F_f, F_bo, F_0, and the right side."""
+    """Yield one least squares row per window: m, c, G, F_f, F_bo, F_0, and the right side."""
     for length_s in _WINDOWS_s:
         n = max(8, round(length_s / h))
         s = np.linspace(-1.0, 1.0, n + 1)

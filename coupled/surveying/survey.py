@@ -1,12 +1,12 @@
-"""Where a JSBSim model trims, found by search, and how its controls move, found by flying.
+"""Search of the trim of a JSBSim model, and test flights that find how its controls move.
 
 The first speed to try is that at which the wing carries the weight at a moderate lift coefficient,
 
     V = √(2·W/(ρ₀·S·C_L)),
 
 by the wing's area and the empty weight in the model's own file; then faster and slower ones, and
-other heights. Each try is JSBSim's own full trim, as a rig's. Of the states that trim, one that
-holds is preferred: hands off for some seconds it neither meets the ground nor turns over.
+other heights. Each try is JSBSim's own full trim, as for a rig. A state is preferred in which the
+aircraft, hands off for some seconds, neither meets the ground nor turns over.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from coupled.errors import InputError, nearest
 from coupled.files import read_bytes
 from coupled.flight.aircraft import make_aircraft
 from coupled.flight.airframe import packaged_models
-from coupled.flight.direct import check_direct_controls
+from coupled.flight.directcontrols import check_direct_controls
 from coupled.flight.modeltext import UnreadableModelError, parsed
 from coupled.record.channels import CONTROL_NAMES, PITCH, ROLL, ControlName
 from coupled.resources import aircraft_folder, shipped_rigs
@@ -34,13 +34,13 @@ from coupled.units import DEGREE_rad, FOOT_m
 FRAME_s = 1.0 / 120.0
 _LIFT = (0.4, 0.25, 0.6, 0.15, 0.9, 0.08, 1.3)  # lift coefficients at the empty weight, in order
 _ALTITUDES_m = (1500.0, 300.0, 5000.0, 9000.0, 15000.0)
-_SPEEDS_m_per_s = (50.0, 90.0, 30.0, 140.0, 20.0, 220.0)  # of a model that does not say its wing
+_SPEEDS_m_per_s = (50.0, 90.0, 30.0, 140.0, 20.0, 220.0)  # of a model without a wing area
 _DENSITY_kg_per_m3 = 1.225
 _TO_kg = {"LBS": 0.45359237, "KG": 1.0, "SLUG": 14.5939}
 _TO_m2 = {"FT2": FOOT_m**2, "M2": 1.0}
 _GEAR_UP = {"gear/gear-cmd-norm": 0.0}
 _HOLDS_s = 5.0
-_LONGEST_s = 12.0  # spent on one model
+_LONGEST_s = 12.0  # largest time for one model
 _TURNED_rad = 0.5
 _STILL = "does not move its"  # of `check_direct_controls`
 _ANGLE = re.compile(r"fcs/.*pos-(rad|deg)")
@@ -50,11 +50,11 @@ _MOST_SURFACES = 4
 
 @dataclass(frozen=True)
 class Surveyed:
-    """What was found of a model; SI.
+    """The results for a model; SI.
 
-    `flight` is a state in which it trims and `holds` whether it keeps it hands off; without one,
-    `why` has the reason. `controls` are those that a rig can lead; `lacking` says what keeps the
-    others out.
+    `flight` is a state in which it trims and `holds` whether it keeps this state hands off; without
+    one, `why` is the reason. `controls` are those that a rig can move; `lacking` has the reasons
+    for the others.
     """
 
     model: str
@@ -63,7 +63,7 @@ class Surveyed:
     why: str = ""
     controls: tuple[ControlName, ...] = ()
     lacking: tuple[str, ...] = ()
-    slowest: float = 0.0  # calibrated airspeed at which it flies so at that height, m/s
+    slowest: float = 0.0  # least calibrated airspeed at that height, m/s
     fastest: float = 0.0
     mass_kg: float = 0.0  # empty
     rigs: tuple[str, ...] = ()
@@ -74,7 +74,7 @@ class Surveyed:
         return self.flight is None or self.flight.direct_controls
 
     def as_dict(self) -> dict[str, object]:
-        """Return the findings by name, as JSON takes them."""
+        """Return the results by name as JSON data."""
         flight = self.flight
         return {
             "model": self.model,
@@ -117,17 +117,17 @@ class ModelFile(NamedTuple):
 
 
 def known_models() -> dict[str, Path]:
-    """Return the models that are here, packaged and our own: {name: folder of all models}."""
+    """Return the available models, packaged and our own: {name: folder of all models}."""
     own = aircraft_folder()
     ours = {f.name: own for f in own.iterdir() if (f / f"{f.name}.xml").is_file()}
     return dict(sorted({**packaged_models(), **ours}.items(), key=lambda one: one[0].lower()))
 
 
 def chosen_models(words: Sequence[str]) -> list[ModelFile]:
-    """Return some models, or all that are known.
+    """Return some models, or all known models.
 
     A word is a known model, a model's file, its folder, or a folder of models, of which all are
-    returned. Raises InputError for any other.
+    returned. Raises InputError for other words.
     """
     known = known_models()
     if not words:
@@ -156,7 +156,7 @@ def _models_of(word: str, known: Mapping[str, Path]) -> list[ModelFile]:
         if path.is_file() and path.suffix == ".xml":
             return [model_file(path)]
         found = _models_in(path) or [each for f in sorted(path.iterdir()) for each in _models_in(f)]
-    except (OSError, ValueError):  # no folder, or no name that one can have
+    except (OSError, ValueError):  # no folder, or an impossible name
         found = []
     if not found:
         problem = f"is no JSBSim model and no folder of one (NAME/NAME.xml); {nearest(word, known)}"
@@ -179,7 +179,7 @@ def model_file(path: Path) -> ModelFile:
 
 
 def _is_main(file: Path) -> bool:
-    """Tell whether a file is a model's main file, by its root."""
+    """Return whether a file is a model's main file, by its root."""
     try:
         return parsed(read_bytes(file), file.name).tag == "fdm_config"
     except (InputError, UnreadableModelError):
@@ -196,9 +196,9 @@ def rigs_by_model() -> dict[str, list[str]]:
 
 
 def survey(model: ModelFile, *, speeds: bool = False) -> Surveyed:
-    """Return what is found of a model.
+    """Return the results for a model.
 
-    With `speeds` the range of speeds is sought as well. Raises nothing for a model that fails.
+    With `speeds` the range of speeds is found as well. Failures of the model are in the result.
     """
     home = model.home
     known = not model.own and not model.file
@@ -214,7 +214,7 @@ def survey(model: ModelFile, *, speeds: bool = False) -> Surveyed:
                 found = (flight, holds)
             if holds:
                 break
-        else:  # the first try is the likeliest, and its reason the one that counts
+        else:  # the first state is the most likely one, so its reason is reported
             found_out = problem.partition("calibrated_airspeed_m_per_s = ")[2].partition(": ")[2]
             why = why or found_out.partition("; choose")[0] or problem
         if time.monotonic() > ended_s:
@@ -233,7 +233,7 @@ def survey(model: ModelFile, *, speeds: bool = False) -> Surveyed:
 
 
 def surveyed(word: str, model: ModelFile, airframe_only: bool = False) -> Surveyed:
-    """Return what is found of a model for a first rig; `word` names it in faults.
+    """Return the results for a model for a draft rig; `word` names it in errors.
 
     Raises InputError if it does not trim or, unless `airframe_only`, has no control for a rig.
     """
@@ -249,7 +249,7 @@ def surveyed(word: str, model: ModelFile, airframe_only: bool = False) -> Survey
 
 
 def _tries(model: ModelFile) -> Iterator[Flight]:
-    """Yield states to try, the likeliest first, with the gear up where there is one to raise."""
+    """Yield states to try, the most likely first, with a retractable gear up."""
     speeds, folder = _likely_speeds(model.path), str(model.home) if model.own else ""
     places = [(i + 2 * j, v, h) for i, v in enumerate(speeds) for j, h in enumerate(_ALTITUDES_m)]
     gear: dict[str, float] | None = None
@@ -282,7 +282,7 @@ def _mass_kg(file: Path) -> float:
 
 
 def _quantity(file: Path, tag: str, units: dict[str, float]) -> float:
-    """Return a number of a model's file in SI, 0 where it does not say."""
+    """Return a number of a model's file in SI, 0 if it is missing."""
     try:
         element = parsed(read_bytes(file), file.name).find(f".//{tag}")
         if element is None:
@@ -303,7 +303,7 @@ def _trims(flight: Flight, home: Path) -> str:
 
 
 def _holds(flight: Flight, home: Path) -> bool:
-    """Tell whether a trimmed aircraft keeps its attitude, hands off, for some seconds."""
+    """Return whether a trimmed aircraft keeps its attitude, hands off, for some seconds."""
     aircraft = make_aircraft(flight, FRAME_s, ("column", "wheel"), [home], "model")
     start = aircraft.motion()
     for _ in range(round(_HOLDS_s / FRAME_s)):
@@ -318,7 +318,7 @@ def _holds(flight: Flight, home: Path) -> bool:
 def _controls(
     flight: Flight, home: Path
 ) -> tuple[Flight, tuple[ControlName, ...], tuple[str, ...]]:
-    """Return the flight by its controls, those that a rig can lead, and what the others lack."""
+    """Return the flight with its controls, those that a rig can move, and the others' reasons."""
     asked, led, lacking = _led(flight, home)
     still = [each.partition(":")[0] for each in lacking if _STILL in each]
     own = {control: _moving_angles(flight, home, control) for control in still}
@@ -331,7 +331,7 @@ def _controls(
 
 
 def _led(flight: Flight, home: Path) -> tuple[Flight, tuple[ControlName, ...], tuple[str, ...]]:
-    """Return what `_controls` does, by the surfaces' properties of the flight."""
+    """Return the results of `_controls` for the surface properties of the flight."""
     for direct in (True, False):
         asked = flight.model_copy(update={"direct_controls": direct})
         led, lacking = list[ControlName](), list[str]()
@@ -349,9 +349,9 @@ def _led(flight: Flight, home: Path) -> tuple[Flight, tuple[ControlName, ...], t
 
 
 def _moving_angles(flight: Flight, home: Path, control: str) -> list[str]:
-    """Return the model's own positions in rad or deg that a control's command moves, all alike.
+    """Return the model's own positions in rad or deg that a control's command moves.
 
-    None if they differ, as a surface and its tab do.
+    Empty if they differ, as those of a surface and its tab do.
     """
 
     def angles(command: float) -> dict[str, float]:
@@ -379,19 +379,19 @@ def _moving_angles(flight: Flight, home: Path, control: str) -> list[str]:
 def speed_range(
     flight: Flight, home: Path, controls: tuple[ControlName, ...]
 ) -> tuple[float, float]:
-    """Return the slowest and the fastest calibrated airspeed, m/s, at which a model flies.
+    """Return the least and the greatest calibrated airspeed, m/s, at which a model flies.
 
-    At each it trims and answers each of the controls. Sought from the flight's own by steps of
-    a tenth; `home` is the folder of all models.
+    At both it trims and responds to each of the controls. The search starts at the speed of the
+    flight, in steps of a tenth; `home` is the folder of all models.
     """
     slowest, fastest = (_furthest(flight, home, controls, step) for step in (0.9, 1.1))
     return slowest, fastest
 
 
 def _furthest(flight: Flight, home: Path, controls: tuple[ControlName, ...], step: float) -> float:
-    """Return the speed furthest from a trimmed one at which it flies by its controls.
+    """Return the speed furthest from a trimmed one at which it still trims and responds.
 
-    Sought by steps of a factor.
+    The search multiplies the speed by `step`.
     """
     speed = flight.calibrated_airspeed
     for _ in range(15):

@@ -42,7 +42,7 @@ Values = Mapping[str, NDArray[np.float64]]  # of each term over the flight
 class AeroTerm:
     """A named function: its axis, and its share of the axis in a flight.
 
-    The axis is empty for a function to which others refer, and the share then None.
+    For a function that others refer to, the axis is empty and the share None.
     """
 
     term: str
@@ -78,7 +78,7 @@ class ModelTerms(Sequence[AeroTerm], Displayed, Tabular):
         return f"ModelTerms({self.model}: {len(self)} terms; {self.flown})"
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the model, the flight and the terms, as JSON takes them."""
+        """Return the model, the flight and the terms as JSON data."""
         return {
             "model": self.model,
             "altitude_m": self.flight.altitude,
@@ -88,7 +88,7 @@ class ModelTerms(Sequence[AeroTerm], Displayed, Tabular):
         }
 
     def to_polars(self) -> pl.DataFrame:
-        """Return a row a term."""
+        """Return one row per term."""
         return frame_of([asdict(one) for one in self.terms])
 
 
@@ -99,7 +99,7 @@ def list_terms(
 ) -> ModelTerms:
     """Return a model's terms with their shares in the first case of a run, or by default.
 
-    Raises InputError for a model that is not here, does not trim or has no named functions, and for
+    Raises InputError for a model that is unknown, does not trim or has no named functions, and for
     a run of another model.
     """
     chosen = chosen_model(fspath(model))

@@ -1,1 +1,1 @@
-"""The tables of results: one function for each, which the terminal, HTML and notebooks show."""
+"""The tables of results, used by the terminal, HTML and notebooks."""

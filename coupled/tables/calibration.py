@@ -1,4 +1,4 @@
-"""The tables of a calibration, of a plan, of readings, and of a control's checks."""
+"""The tables of a calibration, of a plan, of readings, and of the checks of a control."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from coupled.tables.table import Row, Table, passed
 if TYPE_CHECKING:
     from coupled.calibration.checks import ControlCheck
     from coupled.calibration.coverage import Coverage
-    from coupled.calibration.planned import ReadingsPlan
     from coupled.calibration.readings import Readings
+    from coupled.calibration.readingsplan import ReadingsPlan
     from coupled.calibration.result import CalibrationResult
 
 _DECIMALS = (5, 2, 3, 3, 3)
@@ -116,7 +116,7 @@ def coverage_table(found: Coverage) -> Table:
 
 
 def checks_table(control: str, checks: Sequence[ControlCheck], system: System = "si") -> Table:
-    """Return a control's checks: measured, reference, tolerance and margin."""
+    """Return the checks of a control: measured, reference, tolerance and margin."""
     return Table(
         (control, *check_heads(system)),
         tuple(check_row(check, system) for check in checks),
@@ -125,7 +125,7 @@ def checks_table(control: str, checks: Sequence[ControlCheck], system: System = 
 
 
 def check_heads(system: System = "si") -> tuple[str, ...]:
-    """Return the heads of what `check_row` gives beside the check's name."""
+    """Return the headings of the columns of `check_row` after the name of the check."""
     return (f"q̄, {pressure_shown(system).unit}", "rig", "reference", "±", "", "margin", "")
 
 
@@ -138,7 +138,7 @@ def check_row(check: ControlCheck, system: System = "si") -> Row:
 
 
 def narrowest(checks: Sequence[ControlCheck]) -> list[ControlCheck]:
-    """Return every check that fails, and of each kind the one with the least margin."""
+    """Return all failed checks, and the check with the least margin of each kind."""
     least: dict[str, ControlCheck] = {}
     for check in checks:
         kind = check.name.split(",")[0]

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from coupled.campaign.survival import SurvivalLimit
     from coupled.campaign.verdict import Verdict
 
-_STRONGEST = 6  # parameters of a figure
+_STRONGEST = 6  # parameters listed per figure of merit
 _SHARES = {"least": 0.0, "5 %": 0.05, "median": 0.5, "95 %": 0.95, "greatest": 1.0}
 
 
@@ -41,7 +41,7 @@ def _verdict(verdict: Verdict, system: System) -> Row:
 
 
 def spread_table(found: pl.DataFrame, kept: Sequence[str], system: System = "si") -> Table:
-    """Return the distribution of each figure over the flights that did not end early."""
+    """Return the distribution of each figure of merit over the flights that did not end early."""
     rows: list[Row] = []
     for configuration in found["configuration"].unique(maintain_order=True):
         rows.append((configuration,))
@@ -56,7 +56,7 @@ def spread_table(found: pl.DataFrame, kept: Sequence[str], system: System = "si"
 
 
 def flown_values(found: pl.DataFrame, configuration: str, name: str) -> NDArray[np.float64]:
-    """Return a figure, in SI, of the flights of a configuration that did not end early."""
+    """Return a figure of merit, in SI, of the flights of a configuration that did not end early."""
     ours = (pl.col("configuration") == configuration) & (pl.col("ended_early") == "")
     values: NDArray[np.float64] = found.filter(ours)[name].drop_nulls().cast(pl.Float64).to_numpy()
     finite: NDArray[np.float64] = values[np.isfinite(values)]
@@ -64,7 +64,7 @@ def flown_values(found: pl.DataFrame, configuration: str, name: str) -> NDArray[
 
 
 def survival_table(limits: Sequence[SurvivalLimit], key: str) -> Table:
-    """Return what each configuration survives of a varied key, and the boundary's value."""
+    """Return the flights that each configuration survives over a varied key, and the boundary."""
     rows = tuple(
         (
             limit.configuration,

@@ -44,7 +44,7 @@ def _range(values: np.ndarray) -> Row:
 
 
 def export_table(found: Export) -> Table:
-    """Return the distance of each flight by JSBSim alone from the program's own flight."""
+    """Return the difference of each flight by JSBSim alone from the flight of the package."""
     cells = tuple(
         (
             *(one.run, f"{one.case}, {one.configuration}"),

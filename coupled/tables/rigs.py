@@ -1,4 +1,4 @@
-"""The tables of a rig, of JSBSim's models, of the shipped runs, and of a log's control."""
+"""The tables of a rig, of JSBSim models, of the shipped runs, and of a logged control."""
 
 from __future__ import annotations
 
@@ -39,13 +39,13 @@ def terms_table(found: ModelTerms) -> Table:
 
 
 def runs_table(cards: Mapping[str, Mapping[str, Any]]) -> Table:
-    """Return the rig of each run file, and the first sentence of its card."""
+    """Return the rig of each run file, and the first sentence of its description."""
     rows = tuple((name, card["rig"], _sentence(card["card"])) for name, card in cards.items())
     return Table(("run", "rig", "what it shows"), rows, align="l")
 
 
 def _sentence(card: str) -> str:
-    """Return the first sentence of a card."""
+    """Return the first sentence of a description."""
     return " ".join(card.split()).partition(". ")[0].rstrip(".") + "."
 
 
@@ -55,7 +55,7 @@ def logged_table(
     questions: Mapping[str, Question],
     system: System = "si",
 ) -> Table:
-    """Return the numbers of a control that a log gives, and whether the log determines each."""
+    """Return the parameters of a control from a log, and whether the log determines each."""
     rows = []
     for name, value in numbers.items():
         question = questions[name]

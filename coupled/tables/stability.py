@@ -1,4 +1,4 @@
-"""The table of a rig's stability: its limits."""
+"""The table of the stability limits of a rig."""
 
 from __future__ import annotations
 

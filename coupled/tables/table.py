@@ -6,12 +6,12 @@ from dataclasses import dataclass, replace
 from typing import ClassVar, Literal
 
 Tone = Literal["good", "bad", "plain"]
-NONE = "–"  # in place of a missing figure
+NONE = "–"  # for a missing value
 
 
 @dataclass(frozen=True)
 class Mark:
-    """A cell that states whether something is good."""
+    """A cell that states whether a result is good."""
 
     text: str
     tone: Tone
@@ -28,11 +28,11 @@ def passed(good: bool) -> Mark:
 
 @dataclass(frozen=True)
 class Table:
-    """A table: a head for each column, with units in the heads or in the first cell of a row.
+    """A table with a heading for each column; units are in the headings or in the first cells.
 
-    A row of a single cell is a heading of the rows below it. `align` has an l (words, at the left)
-    or an r (numbers, at the right) for each column; its last letter is that of all further columns.
-    A narrow terminal may leave out the columns whose heads are in `spare`, the last first.
+    A row of a single cell is a heading of the rows below it. `align` has an l (text, left) or an r
+    (numbers, right) for each column; its last letter applies to all further columns. A narrow
+    terminal may omit the columns whose headings are in `spare`, the last first.
     """
 
     kind: ClassVar[str] = "table"
@@ -43,11 +43,11 @@ class Table:
     spare: tuple[str, ...] = ()
 
     def has_words(self, column: int) -> bool:
-        """Return whether a column, counted from 0, has words, not numbers."""
+        """Return whether a column, counted from 0, has text and not numbers."""
         return self.align[min(column, len(self.align) - 1)] == "l"
 
     def without(self, head: str) -> Table:
-        """Return the table without the columns of a head."""
+        """Return the table without the columns of a heading."""
         kept = [i for i, each in enumerate(self.heads) if each != head]
         return replace(
             self,
@@ -58,10 +58,10 @@ class Table:
 
 
 def number(value: float | None, digits: int = 4) -> str:
-    """Return a number with so many significant digits; a dash for None."""
+    """Return a number with `digits` significant digits, or a dash for None."""
     return NONE if value is None else f"{value:.{digits}g}"
 
 
 def interval(low: float, high: float, form: str) -> str:
-    """Return the ends of an interval, each in a format: `0.2 to 0.3`."""
+    """Return the ends of an interval in a number format: `0.2 to 0.3`."""
     return f"{low:{form}} to {high:{form}}"

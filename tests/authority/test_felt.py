@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from coupled.authority.held import average_held_forces
+from coupled.authority.heldcontrol import average_held_forces
 from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import Manoeuvre, configure
 from coupled.flight.pilot import PILOTS

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from coupled.calibration.accuracy import deflection_off, expected, felt_off, made_of_asked
-from coupled.calibration.assumed import Scales
+from coupled.calibration.accuracy import actual_over_ordered, deflection_off, expected, felt_off
+from coupled.calibration.assumedscales import Scales
 from coupled.calibration.errors_in_variables import errors_in_variables
 from coupled.calibration.estimate import Estimate, usual_instruments
 from coupled.rig.statics import static_line
@@ -41,7 +41,7 @@ def test_closed_forms_are_the_rigs_statics() -> None:
     rig = bench({f"controls.column.{key}": value for key, value in changes.items()})
     line = static_line(rig, "column", 3000.0, np.array([0.03]))
     true, assumed = Scales(0.93, 1.05, 1.04), Scales(1.0, 1.0, 1.0)
-    made = made_of_asked(assumed, true)
+    made = actual_over_ordered(assumed, true)
     assert made == pytest.approx(0.93 / 1.05)
     felt = felt_off(made, 1.1 * K_REPORT, K_REPORT, (G_STIFF, 560.0))
     assert line.force[0] / line.deflection[0] / G_STIFF - 1.0 == pytest.approx(felt, rel=1e-9)
@@ -71,7 +71,7 @@ def test_what_is_promised_is_the_scatter_that_comes(tied: bool) -> None:
         g, bend = found.gradient, fit.line.bend.value
         assumed = Scales(fit.line.s1.value, s2.value, fit.s3.value)
         offs.append(deflection_off(assumed, bend, true, K, g))
-        made = made_of_asked(assumed, true)
+        made = actual_over_ordered(assumed, true)
         felts.append(felt_off(made, bend, K, (g, control.loader.basic_gradient)))
         errors.append((found.deflection.error, found.felt.error))
     promised = np.sqrt(np.mean(np.square(errors), axis=0))

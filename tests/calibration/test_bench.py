@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from coupled.authority.compare import Outcome, compare
-from coupled.calibration.accuracy import deflection_off, felt_off, made_of_asked
-from coupled.calibration.assumed import Scales, real_scales
+from coupled.calibration.accuracy import actual_over_ordered, deflection_off, felt_off
+from coupled.calibration.assumedscales import Scales, real_scales
 from coupled.calibration.bench import CalibrationBench, take_readings
 from coupled.calibration.calibrate import calibrate_control
 from coupled.calibration.calibrated import with_calibration
@@ -248,7 +248,7 @@ def test_a_bench_calibrated_and_flown_has_the_promised_authority(tmp_path: Path)
         assumed = Scales(found.line.s1.value, s2.value, found.s3.value)
         k, stiff = found.line.bend.value, max(never.schedule.total_gradient)
         off = deflection_off(assumed, k, true, bend, stiff)
-        made = made_of_asked(assumed, true)
+        made = actual_over_ordered(assumed, true)
         felt = felt_off(made, k, bend, (stiff, never.loader.basic_gradient))
         assert after.loss == pytest.approx(-off, abs=4e-4)
         assert after.felt_ratio - 1.0 == pytest.approx(felt, abs=4e-4)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from coupled.calibration.assumed import assumed_scales, real_scales, stale
+from coupled.calibration.assumedscales import assumed_scales, real_scales, stale
 from coupled.calibration.calibrate import calibrate_control
 from coupled.calibration.calibrated import with_calibration
 from coupled.calibration.estimate import perfect_instruments, usual_instruments

@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 
 from coupled.calibration.documentation import check_feel
-from coupled.calibration.letgo import scheduled
 from coupled.calibration.reasons import reasons
+from coupled.calibration.releaseschedule import schedule_for_release
 from coupled.rig.rig import Rig
 from tests.support.readings import report_rig
 
@@ -23,7 +23,7 @@ def test_a_release_fails_by_the_bend_and_no_reason_is_left_where_it_is_put_right
     rig = report_rig()
     assert "springs back by the structure's bend" in said(rig)
     assert "coupled document RIG --write" in said(rig)
-    assert said(scheduled(rig, "column")) == ""
+    assert said(schedule_for_release(rig, "column")) == ""
     assert (
         said(
             rig.changed(

@@ -16,7 +16,7 @@ from coupled.campaign.plan import planned_flights, read_plan
 from coupled.campaign.sensitivity import Floats, design, sensitivity, sobol
 from coupled.cli import app
 from coupled.errors import InputError
-from coupled.parallel import Here
+from coupled.parallel import SerialExecutor
 from coupled.resources import shipped_sweeps
 from tests.support.runs import PUSH
 
@@ -175,7 +175,7 @@ def test_flown_losses_have_the_indices_of_their_closed_form(
     assert (tmp_path / "o/sweep.png").stat().st_size > 10_000
     assert "column loader bend" in ran.output
     with opened(tmp_path / "o", plan) as journal:  # all are there: nothing is flown
-        assert len(fly_sweep(plan, journal, Here())) == 64 * 4
+        assert len(fly_sweep(plan, journal, SerialExecutor())) == 64 * 4
 
 
 @pytest.mark.parametrize("samples", ["100", "4"])

@@ -11,7 +11,7 @@ from coupled.campaign.flights import fly_planned, fly_sweep
 from coupled.campaign.journal import JOURNAL, opened
 from coupled.campaign.plan import planned_flights
 from coupled.errors import InputError
-from coupled.parallel import Here, executor
+from coupled.parallel import SerialExecutor, executor
 from tests.support.commands import coupled, files
 from tests.support.runs import PUSH
 from tests.support.sweeps import ASSUMED, BEND, GRID, flown, plan_of, rows_in, write_sweep
@@ -65,7 +65,7 @@ def test_a_full_disk_is_one_line_and_keeps_the_finished_flights(folder: Path) ->
         with opened(folder / "o", plan) as journal:
             resource.setrlimit(resource.RLIMIT_FSIZE, (1500, limits[1]))
             with pytest.raises(InputError, match=r"flights\.jsonl: cannot be written: .* are kept"):
-                fly_sweep(plan, journal, Here())
+                fly_sweep(plan, journal, SerialExecutor())
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)
     kept = rows_in(folder / "o" / JOURNAL)

@@ -15,7 +15,7 @@ import coupled
 from coupled.authority.compare import Comparison, Flight, compare, fly_and_judge, judge
 from coupled.authority.figures import named
 from coupled.authority.maps import loss_maps
-from coupled.calibration.assumed import outdated_bends
+from coupled.calibration.assumedscales import outdated_bends
 from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import Manoeuvre, PressureProfile, configure
 from coupled.flight.pilot import Pilot

@@ -34,7 +34,7 @@ from coupled.gap.batch import jobs, known_row, made_by
 from coupled.outputs import Outputs
 from coupled.parallel import cores
 from coupled.plots.saving import BOX, save, svg_text
-from coupled.reports.page import Made, Report, Section, Text, Verdict, render
+from coupled.reports.page import Provenance, Report, Section, Text, Verdict, render
 from tests.support.commands import coupled as command
 from tests.support.rigs import bench
 
@@ -98,7 +98,7 @@ def test_letters_that_no_font_has_are_drawn_as_boxes_without_a_warning(tmp_path:
 
 
 def test_a_report_shows_no_letter_that_acts_on_a_page() -> None:
-    made = Made(HOSTILE, (("coupled", HOSTILE),), ())
+    made = Provenance(HOSTILE, (("coupled", HOSTILE),), ())
     section = Section(HOSTILE, (Text((HOSTILE,)),))
     text = render(Report("check", HOSTILE, Verdict(HOSTILE), (section,), (("a", HOSTILE),), made))
     assert "a?[31mb?c" in text

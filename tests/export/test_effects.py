@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from coupled.errors import InputError
-from coupled.exporting.beside import beside
+from coupled.exporting.comparison import compare
 from coupled.exporting.control import control_system
 from coupled.exporting.keys import EXPORTED, REFUSED, WITHOUT_EFFECT, check_keys
 from coupled.exporting.write import DEFLECTION, FORCE, LOSS
@@ -128,7 +128,7 @@ def hold(changes: dict[str, Any]) -> None:
     push = forces(times, [0.0, 0.0, 70.0, 70.0, -60.0, -60.0, 0.0, 0.0])
     manoeuvre = on_bench(bench(changes), push, 4.0, 2500.0)
     ours, alone, _ = both(manoeuvre)
-    found = beside(manoeuvre.configured("compensated"), "compensated", ours, alone)
+    found = compare(manoeuvre.configured("compensated"), "compensated", ours, alone)
     assert found.deflection <= DEFLECTION, found
     assert found.estimate <= DEFLECTION, found
     assert max(found.force, found.modifying_force) <= FORCE, found
@@ -243,6 +243,6 @@ def test_controls_of_one_structure_bend_each_other() -> None:
     ours, alone, _ = both(case)
     bent = ours["column_deflection_m"][ours.time_s > 4.0]
     assert np.ptp(bent) > 3e-4
-    found = beside(case.configured("compensated"), "compensated", ours, alone)
+    found = compare(case.configured("compensated"), "compensated", ours, alone)
     assert found.deflection <= DEFLECTION
     assert found.estimate <= DEFLECTION

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from coupled.errors import InputError
-from coupled.exporting.beside import beside
+from coupled.exporting.comparison import compare
 from coupled.exporting.write import DEFLECTION, FORCE, LOSS
 from coupled.flight.runfile import read_run
 from coupled.resources import shipped_runs
@@ -19,7 +19,7 @@ def test_a_pull_on_the_t37_is_the_same_channel_by_channel() -> None:
     _, middle, _ = read_run("pull-up-t37")
     ours, alone, said = both(middle)
     assert said == ""  # no message of JSBSim's at load, at trim or in flight
-    found = beside(middle.configured("compensated"), "compensated", ours, alone)
+    found = compare(middle.configured("compensated"), "compensated", ours, alone)
     assert found.deflection < 0.001
     assert found.estimate < 0.001
     assert found.modifying_force < 0.005
@@ -131,7 +131,7 @@ def test_a_digital_product_is_held_over_a_frame_and_a_hybrid_one_is_not() -> Non
     flights = {case.label: both(case) for case in (digital, hybrid)}
     for case in (digital, hybrid):
         ours, alone, _ = flights[case.label]
-        found = beside(case.configured("compensated"), "compensated", ours, alone)
+        found = compare(case.configured("compensated"), "compensated", ours, alone)
         assert found.deflection < 0.001
         assert found.modifying_force < 0.005
     # The two are told apart by far more than that.
@@ -167,7 +167,7 @@ def test_every_shipped_run_flies_in_jsbsim_alone_as_in_ours(run: str) -> None:
             except InputError as error:
                 assert error.key.startswith(("controls.column.services.", "event.")), place
                 continue
-            found = beside(case.configured(configuration), configuration, ours, alone)
+            found = compare(case.configured(configuration), configuration, ours, alone)
             assert said == "", place
             assert found.deflection <= DEFLECTION, place
             assert max(found.force, found.modifying_force) <= FORCE, place

@@ -14,7 +14,7 @@ import pytest
 
 from coupled.errors import InputError
 from coupled.exporting.alone import fly_alone
-from coupled.exporting.beside import beside
+from coupled.exporting.comparison import compare
 from coupled.exporting.write import DEFLECTION, FORCE, LOSS, Export, Flown, export, put
 from coupled.flight.airframe import packaged_models
 from coupled.flight.altered import ALTERATIONS
@@ -91,7 +91,7 @@ def test_a_loaded_aircraft_flies_as_in_our_own_flight_and_its_script_sets_no_loa
     assert b"contents-lbs" not in script
     assert b"pitch_damping" not in script
     ours, alone, said = both(case)
-    found = beside(case.configured("compensated"), "compensated", ours, alone)
+    found = compare(case.configured("compensated"), "compensated", ours, alone)
     assert said == ""
     assert found.deflection <= DEFLECTION
     assert max(found.force, found.modifying_force) <= FORCE

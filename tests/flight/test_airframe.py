@@ -11,7 +11,7 @@ import pytest
 
 from coupled.errors import InputError
 from coupled.flight.airframe import JSBSimAirframe, packaged_models
-from coupled.flight.direct import check_direct_controls
+from coupled.flight.directcontrols import check_direct_controls
 from coupled.record.channels import ALTITUDE, LOAD, SPEED
 from coupled.resources import aircraft_folder, shipped_rigs
 from coupled.rig.parameters import Flight

@@ -18,7 +18,7 @@ from scipy.signal import lsim
 
 from coupled.errors import InputError
 from coupled.flight.airframe import JSBSimAirframe, packaged_models
-from coupled.flight.direct import check_direct_controls
+from coupled.flight.directcontrols import check_direct_controls
 from coupled.record.channels import ELEVATOR, LONGITUDINAL, PITCH, motion_channels
 from coupled.resources import aircraft_folder
 from coupled.rig.parameters import Flight

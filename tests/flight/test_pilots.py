@@ -25,8 +25,8 @@ from coupled.flight.pilot import (
     Track,
 )
 from coupled.flight.pilot.crossover import (
-    Acting,
     Compensation,
+    CompensationFilter,
     Delay,
     Remnant,
     adapt,
@@ -201,7 +201,7 @@ def test_gain_and_lead_or_lag_meet_frequency_and_margin(element: complex, integr
 def test_compensation_and_delay_do_what_they_say_at_a_frequency() -> None:
     h, rate = 1 / 100, 3.0
     pilot = Compensation(2.0, 0.4, 0.0, 0.0)
-    acting, late = Acting(pilot, h), Delay(0.123, h)
+    acting, late = CompensationFilter(pilot, h), Delay(0.123, h)
     wave = np.sin(rate * h * np.arange(4000))
     out = np.array([acting(late(float(value))) for value in wave])
     t = h * np.arange(4000)[-2000:]

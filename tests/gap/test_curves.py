@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from coupled.authority.held import true_deflection
+from coupled.authority.heldcontrol import true_deflection
 from coupled.blind.twin.twin import Twin
 from coupled.gap.chain import Part
 from coupled.gap.diagnose import findings

@@ -16,7 +16,7 @@ from coupled.plots.saving import svg_text
 from coupled.reports.page import (
     Drawing,
     InputFile,
-    Made,
+    Provenance,
     Report,
     Section,
     Text,
@@ -27,7 +27,9 @@ from coupled.reports.page import (
 from coupled.tables.table import Mark, Table
 from tests.support.browser import CHROMIUM, PAPERS, printed
 
-MADE = Made("coupled compare x", (("coupled", "1"),), (InputFile("x.toml", "ab12", "name = 1"),))
+MADE = Provenance(
+    "coupled compare x", (("coupled", "1"),), (InputFile("x.toml", "ab12", "name = 1"),)
+)
 EMPTY_TAGS = {"meta", "br"}
 
 
@@ -124,7 +126,7 @@ def test_no_name_acts_on_the_page(word: str) -> None:
 
 def _words_only(word: str) -> Report:
     table = Table((word,), ((word,), (Mark(word, "good"),)), caption=word)
-    made = Made(word, ((word, word),), (InputFile(word, word, word),))
+    made = Provenance(word, ((word, word),), (InputFile(word, word, word),))
     section = Section(word, (Text((word,)), table))
     return Report(word, word, Verdict(word, "bad", (word,)), (section,), ((word, word),), made)
 

@@ -24,8 +24,8 @@ from coupled.plots.checks import draw_static_checks
 from coupled.plots.documentation import draw_forces
 from coupled.reports.check import check_report
 from coupled.reports.forces import force_summary
-from coupled.reports.made import made_by
 from coupled.reports.page import render
+from coupled.reports.provenance import provenance_of
 from coupled.resources import shipped_rigs
 from coupled.rig.rigfile import read_rig
 from coupled.tables.campaign import spread_table
@@ -116,7 +116,7 @@ def test_a_check_in_us_units_has_them_in_its_report() -> None:
     verdict = Verdict("r", "a", "rigid", "largest force", 44.482, None, 40.0, quantity="force_N")
     checked = CheckResult((verdict,))
     for system, found in zip(SYSTEMS, ("44.48 N", "10 lb"), strict=True):
-        report = render(check_report(checked, made_by("c", []), system))
+        report = render(check_report(checked, provenance_of("c", []), system))
         assert found in report.replace("\N{NO-BREAK SPACE}", " ")
 
 
@@ -126,7 +126,7 @@ def test_a_force_document_in_us_units_has_them_in_figures_and_report() -> None:
     issue = Issue("bench.toml", "", "")
     drawn = {}
     for system, force, pressure in zip(SYSTEMS, ("N", "lb"), ("kPa", "lb/ft²"), strict=True):
-        report = render(force_summary([found], issue, made_by("c", []), system))
+        report = render(force_summary([found], issue, provenance_of("c", []), system))
         assert f"q̄, {pressure}" in report and f">{force}<" in report
         drawn[system] = [draw_forces(found, system), draw_static_checks(found, system)]
         for figure in drawn[system]:

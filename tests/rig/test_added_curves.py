@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from coupled.authority.held import breakaway_force
+from coupled.authority.heldcontrol import breakaway_force
 from coupled.authority.stability.limits import gradient_range
 from coupled.authority.stability.local import about_rest
 from coupled.errors import InputError

@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from coupled.calibration.assumed import real_scales
+from coupled.calibration.assumedscales import real_scales
 from coupled.calibration.bench import CalibrationBench, take_readings
 from coupled.calibration.calibrate import calibrate_control
 from coupled.calibration.calibrated import with_calibration

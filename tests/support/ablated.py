@@ -40,10 +40,10 @@ WITH = "with-all"  # the folder of the answers by all rules
 
 @dataclass
 class Known:
-    """What one record's runs share: prepared records, searches, fits, signatures, noise floors.
+    """The shared data of one record's runs: records, searches, fits, signatures, noise floors.
 
-    `saved_s` is the CPU time of what was used again. Nothing is added once it is `closed`. All keys
-    hold objects, so that no id is used twice.
+    `saved_s` is the CPU time saved by reuse. Nothing is added once it is `closed`. Keys refer to
+    objects that are kept alive, so that no id is used twice.
     """
 
     made: dict[Any, tuple[Any, float, Any]] = field(default_factory=dict)
@@ -51,7 +51,7 @@ class Known:
     closed: bool = False
 
     def of(self, key: Any, objects: Any, make: Callable[[], Any]) -> Any:
-        """Return the known value of a key, or make it; `objects` are those whose ids it has."""
+        """Return the stored value of a key, or compute it; the key has the ids of `objects`."""
         if key in self.made:
             value, took_s, _ = self.made[key]
             self.saved_s += took_s
@@ -64,20 +64,20 @@ class Known:
 
     @property
     def clock_s(self) -> float:
-        """CPU time, s, as if nothing were used again."""
+        """CPU time without reuse, s."""
         return time.process_time() + self.saved_s
 
 
 def _key_of(fit: Fit | None) -> Any:
-    """Return what identifies a fit."""
+    """Return the identity of a fit."""
     return None if fit is None else (fit.effects, tuple(fit.values.items()), fit.cost)
 
 
 @contextmanager
 def shared(known: Known, searched: bool) -> Iterator[None]:
-    """Share what one record's runs have in common within the block; if `searched`, the search too.
+    """Share data between one record's runs in this context, with the search if `searched`.
 
-    What is shared depends on its arguments alone.
+    Shared values depend on their arguments only.
     """
     beam = importlib.import_module("coupled.gap.search.beam")
     screen = importlib.import_module("coupled.gap.search.screen").Screen
@@ -155,7 +155,7 @@ def shared(known: Known, searched: bool) -> Iterator[None]:
         patched(case_class, "by_shots", property(shots)),
         patched(module, "prepare", prepared),
         patched(module, "search", search),
-        # Curves name no cause, and decide no verdict.
+        # Curves name no cause and do not affect the verdict.
         patched(module, "find_curves", lambda *_: None),
     ):
         yield
@@ -163,7 +163,7 @@ def shared(known: Known, searched: bool) -> Iterator[None]:
 
 @dataclass
 class Runs:
-    """The runs of one record: with all rules, and without one each."""
+    """The runs of one record: with all rules, and without each rule."""
 
     job: Job
     known: Known = field(default_factory=Known)
@@ -191,7 +191,7 @@ class Runs:
         }
 
     def with_all(self, rules: Sequence[Rule]) -> dict[str, Any]:
-        """Return the JSON with all rules, and in `acts` the rules that act."""
+        """Return the JSON with all rules, and in `acts` the rules that have an effect."""
         acted = set[str]()
         with watched(rules, acted):
             found = self.diagnosed(None, self.known, searched=True)
@@ -206,7 +206,7 @@ class Runs:
 
 
 def run(todo: Sequence[Job], rules: Sequence[Rule], output: Path) -> None:
-    """Diagnose records with all rules and without each one that acts; keep the answers."""
+    """Diagnose records with all rules and without each active rule; store the answers."""
     every = tuple(dict.fromkeys((*RULES, *rules)))
     for number, job in enumerate(todo, 1):
         runs, made = Runs(job), made_by(job)
@@ -238,7 +238,7 @@ def _keep(file: Path, table: Mapping[str, Any]) -> None:
 
 
 def kept(file: Path, made: Mapping[str, str]) -> dict[str, Any] | None:
-    """Return a kept answer of this version and record; None if there is none."""
+    """Return a stored answer of this version and record, or None."""
     if not file.is_file():
         return None
     try:
@@ -279,7 +279,7 @@ def brier(answer: Answer) -> float:
 
 
 def said(answer: Answer) -> tuple[str, frozenset[str], frozenset[str]]:
-    """Return what counts as an answer's content."""
+    """Return the parts of an answer that are compared."""
     return answer.verdict, frozenset(answer.found), answer.possible
 
 

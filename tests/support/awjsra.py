@@ -19,17 +19,17 @@ CLEAN = {"fcs/flap-cmd-norm": 0.0, "fcs/nozzle-cmd-deg": 18.5, "gear/gear-cmd-no
 
 @cache
 def script(name: str) -> ModuleType:
-    """Return a script of the aircraft's folder as a module."""
+    """Return a script in the folder of the aircraft as a module."""
     spec = importlib.util.spec_from_file_location(name, HOME / f"{name}.py")
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module  # its dataclasses, and the other scripts, look it up there
+    sys.modules[name] = module  # used by its dataclasses and by the other scripts
     spec.loader.exec_module(module)
     return module
 
 
 def validation() -> ModuleType:
-    """Return the module that makes the table of published and flown values."""
+    """Return the module with the table of published and flown values."""
     return script("validate")
 
 
@@ -44,14 +44,14 @@ def trimmed(properties: dict[str, float] | None = None, **flight: float) -> Any:
 def place(fdm: Any, levers: dict[str, float] | None = None, **state: float) -> Any:
     """Set a trimmed aircraft to another state of flight and lever positions.
 
-    A state is named as JSBSim names it, without its `ic/` and with two underscores for a dash.
+    States have JSBSim's names, without `ic/` and with two underscores for a dash.
     """
-    fdm.set_trim_status(True)  # what moves slowly stands where it is asked for
+    fdm.set_trim_status(True)  # slow actuators move to their commands at once
     for name, value in (levers or {}).items():
         fdm[name] = value
     for name, value in state.items():
         fdm["ic/" + name.replace("__", "-")] = value
-    for _ in range(4):  # the rate of the angle of attack, which counts, is an answer too
+    for _ in range(4):  # the rate of the angle of attack depends on the result
         fdm.run_ic()
     fdm.set_trim_status(False)
     return fdm

@@ -1,8 +1,8 @@
-"""A ball screw's axis that moves from point to point, simulated without the package's stages.
+"""An axis with a ball screw that moves between points, simulated without the package.
 
-A mass of 400 kg behind a screw of 10 mm, with bristles for friction that falls with the speed, a
-ripple once a turn, and a scale on the table beside the motor's encoder. Friction and damping differ
-from record to record, as the temperature does.
+A mass of 400 kg behind a screw of 10 mm, with bristle friction that falls with speed, a ripple once
+per turn, and a scale on the table in addition to the motor's encoder. Friction and damping differ
+between records, as with temperature.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def ball_screw(
 ) -> Record:
     """Return a record of the motor's force, its encoder and the scale at 100 Hz.
 
-    `friction` and `damping` are times what they are when it is well.
+    `friction` and `damping` are factors on the healthy values.
     """
     rng = np.random.default_rng(seed)
     wanted = _wanted(seconds, rng)
@@ -78,6 +78,6 @@ def ball_screw(
 
 
 def ball_screw_rig() -> Rig:
-    """Return its rig by the data sheet: some % off, without offset, ripple, Stribeck effect."""
+    """Return its rig by the data sheet: some % off, without offset, ripple and Stribeck effect."""
     numbers = {"mass_kg": 380.0, "damping_N_s_per_m": 900.0, "friction_N": 140.0}
-    return plain_rig(RATE_Hz, numbers | {"servo_frequency_Hz": 20_000.0})  # nothing lies between
+    return plain_rig(RATE_Hz, numbers | {"servo_frequency_Hz": 20_000.0})  # no servo between

@@ -44,9 +44,9 @@ def everything() -> dict[str, Any]:
 
 
 def keep(name: str, figures: Figures, load_before: float) -> None:
-    """Write a benchmark's figures if the environment requests it.
+    """Write the results of a benchmark if the environment requests it.
 
-    `load_before` is the machine's load (mean of a minute) when the benchmark began: that of others.
+    `load_before` is the machine's load (mean of a minute) at the start, by other processes.
     """
     if os.environ.get("COUPLED_BENCHMARKS") != "keep":
         return
@@ -71,7 +71,7 @@ def keep(name: str, figures: Figures, load_before: float) -> None:
 
 
 def kept_figures(name: str) -> dict[str, float]:
-    """Return the figures of a benchmark in the file; none if it has none."""
+    """Return the results of a benchmark in the file, empty if it has none."""
     return dict(everything().get(name, {"figures": {}})["figures"])
 
 
@@ -98,7 +98,7 @@ def frame_cost() -> str:
 
 
 def _frame_parts() -> str:
-    """Return where the time beyond `run()` goes, with one control."""
+    """Return the parts of the time beyond `run()`, with one control."""
     kept = kept_figures("frame parts, 1 control(s)")
     part: dict[str, list[float]] = {}
     for name, value in kept.items():

@@ -25,9 +25,9 @@ HANDLED = (signal.SIGINT, signal.SIGTERM)
 
 
 def coupled(folder: Path, *words: str, columns: int = 80) -> subprocess.CompletedProcess[str]:
-    """Run a command in this process, where all is imported and compiled; return its result.
+    """Run a command in this process, with everything imported and compiled; return its result.
 
-    Standard output and error are files under the command, also for a library in C.
+    Standard output and error are redirected to files, also for libraries in C.
     """
     with (
         patch.dict(os.environ, {**TERMINAL, "COLUMNS": str(columns)}),
@@ -68,13 +68,13 @@ def coupled_anew(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
 
 
 def files(folder: Path) -> set[str]:
-    """Return the files that lie in a folder and below."""
+    """Return all files of a folder and its subfolders."""
     return {str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file()}
 
 
 @contextmanager
 def _as_wide_as(columns: int) -> Iterator[None]:
-    """Set the width of the consoles: they may have taken another one when they were made."""
+    """Set the width of the consoles, which is fixed when they are created."""
     before = [(console, console.width) for console in (out, err)]
     for console, _ in before:
         console.width = columns

@@ -1,4 +1,4 @@
-"""A test with two sensors, logged in each format by its own library; each sensor has its clock."""
+"""A test with two sensors with separate clocks, logged in each format by its own library."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from mcap_ros2.writer import Writer as Ros2
 from nptdms import ChannelObject, TdmsWriter
 
 TIME_s = np.arange(600) / 60.0
-LATER_s = 0.005 + np.arange(800) / 80.0  # when the second sensor was read
+LATER_s = 0.005 + np.arange(800) / 80.0  # sample times of the second sensor
 FORCE_lbf = 4.0 * np.sin(TIME_s)
 DEFLECTION_in = np.sin(LATER_s)
 

@@ -28,7 +28,7 @@ LONG_s = 40.0
 
 
 def starts_of(case: Case, effect: Effect) -> list[dict[str, float]]:
-    """Return where the fits of an effect start beside the nuisance parameters alone."""
+    """Return the start values of the fits of an effect, without those of nuisance parameters."""
     problem = Problem(case)
     root, every = problem.fit(()), np.full(len(case.outputs), 1e6)
     screen = Screen(problem, problem.model_error(root.rig))
@@ -37,7 +37,7 @@ def starts_of(case: Case, effect: Effect) -> list[dict[str, float]]:
 
 
 def know_only(monkeypatch: pytest.MonkeyPatch, effects: Sequence[Effect]) -> None:
-    """Leave these effects in the library; any other is then one that the library lacks."""
+    """Restrict the library to these effects; a record of another effect is then out of library."""
     monkeypatch.setattr(prepare, "library_of", lambda *_: list(effects))
 
 

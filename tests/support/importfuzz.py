@@ -609,7 +609,7 @@ def make_table(seed: int, number: int) -> tuple[str, bytes]:
     return "log.csv", damaged(rng, content) if rng.random() < 0.2 else content
 
 
-# What came of a case.
+# The outcome of a case.
 
 
 def outcome(reader: str, seed: int, number: int, folder: Path) -> str:

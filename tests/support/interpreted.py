@@ -1,9 +1,9 @@
 """The rig's kernels as plain Python: a changed stage runs without compilation.
 
-`interpret()` puts them in the compiler's place; it is for whoever imports the stages after it.
-A kernel reads the fields of a record as attributes, which numpy's records do not have: each is
-opened into plain objects for the call, and what the kernel has set is written back after it. Where
-another argument is the same memory, each field is read and set in the record itself, more slowly.
+`interpret()` replaces the compiler, for modules that are imported later. A kernel reads the fields
+of a record as attributes, which numpy's records do not have: each record is converted to a plain
+object for the call, and its changes are written back. If another argument is the same memory, each
+field is read and set in the record itself, which is slower.
 """
 
 from __future__ import annotations
@@ -64,12 +64,12 @@ class InPlace:
 
 
 def _is_table(argument: Any) -> bool:
-    """Tell whether an argument is an array of records."""
+    """Return whether an argument is an array of records."""
     return type(argument) is np.ndarray and argument.dtype.names is not None
 
 
 def _also_numbers(table: Any, arguments: tuple[Any, ...]) -> bool:
-    """Tell whether another argument is the memory of an array of records."""
+    """Return whether another argument is the memory of an array of records."""
     others = [each for each in arguments if type(each) is np.ndarray and each is not table]
     return any(np.may_share_memory(table, other) for other in others)
 
@@ -104,7 +104,7 @@ def _carray(address: int, shape: int | tuple[int, ...], dtype: Any) -> Any:
 
 
 def interpret() -> None:
-    """Make the rig's kernels plain Python from here on; kernels of other packages stay compiled."""
+    """Make the rig's kernels plain Python from now on; kernels of other packages stay compiled."""
     bound = compiled.bound
 
     def plain_or(compiler: Function) -> Function:

@@ -64,7 +64,7 @@ def pressure(rig: Rig) -> np.ndarray | None:
 
 
 def make(rig: Rig, level_N: float, seed: int) -> Record:
-    """Return the record of a rig that is as filed, with the sensors' noise, rounded."""
+    """Return a noisy, rounded record of the rig as filed."""
     frames = round(DURATION_s * rig.frame_rate)
     names = channels(rig)
     noise = np.random.default_rng(seed).standard_normal((frames, len(names)))

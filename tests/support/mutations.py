@@ -44,7 +44,7 @@ values = [1e-6]
 TRUTH: dict[str, object] = {
     **{"class": "none", "rig": "t37", "effects": [], "stages": [], "gap": {}, "missing": []}
 }
-# Words that a file's author, or his enemy, puts where a number or a name belongs.
+# Words that an author, or an attacker, may write instead of a number or a name.
 WORDS: tuple[bytes, ...] = (
     *(
         b"nan",

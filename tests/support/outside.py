@@ -1,4 +1,4 @@
-"""Bench records of a twin with a fault that the library lacks, and their curves."""
+"""Bench records of a twin with a fault outside the library, and fitted curves."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ Fault = Callable[[Twin, float, float], None]  # of the twin, time in s and q̄ i
 
 
 def recorded(fault: Fault, seed: int = 1, rig: Rig = RIG, seconds: float = SECONDS) -> Record:
-    """Return a noisy bench record of the twin of a rig; the fault is set anew in each frame."""
+    """Return a noisy bench record of the twin of a rig; the fault is applied at each frame."""
     rng = np.random.default_rng(seed)
     frames = round(seconds * rig.frame_rate)
     shape, _ = pilot_shape(rng, frames, rig.frame_rate)
@@ -51,7 +51,7 @@ def recorded(fault: Fault, seed: int = 1, rig: Rig = RIG, seconds: float = SECON
 
 
 def curves_of(record: Record, rig: Rig = RIG) -> Curves | None:
-    """Return the curves beside no effect at all, as if the library were empty."""
+    """Return the curves fitted without effects, as with an empty library."""
     prepared = prepare(rig, {"record": record}, Part("column"))
     case, choice = prepared.case, search_sets(prepared.case, [])[1]
     return find_curves(case, choice, (), [record])

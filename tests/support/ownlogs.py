@@ -74,7 +74,7 @@ def manoeuvre(length_s: float, size: float = 0.12, by_hand: bool = True) -> Floa
         hold(control, at + 0.5, 0.5, -1.0)
     if not by_hand:
         return asked
-    hand = np.hanning(25) / np.sum(np.hanning(25))  # a hand takes a tenth of a second
+    hand = np.hanning(25) / np.sum(np.hanning(25))  # a hand needs a tenth of a second
     return np.column_stack([np.convolve(each, hand, mode="same") for each in asked.T])
 
 

@@ -1,4 +1,4 @@
-"""Commands started in the background, to be stopped or killed at work."""
+"""Commands started in the background, to be stopped or killed while they run."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-PATIENCE_s = 300.0  # a command that takes so long hangs, however busy the machine is
+PATIENCE_s = 300.0  # a command that takes longer hangs, also on a busy machine
 
 
 def begun(

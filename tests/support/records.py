@@ -1,7 +1,7 @@
 """Reference records, and the noise of their sensors.
 
-Those of the independent twin are in the repository (tests/support/make_records.py). Three more,
-made by a separate program from the rig's description, are used if they lie in `../shared/rig`.
+Records of the independent twin are in the repository (tests/support/make_records.py). Three more,
+made by a separate program from the description of the rig, are used if found in `../shared/rig`.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""The rules of the diagnosis beyond its design, each with the one place that switches it off.
+"""The rules of the diagnosis beyond its design, each with the place that disables it.
 
-`tests.ablation` measures what each is worth.
+`tests.ablation` measures the effect of each rule.
 """
 
 from __future__ import annotations
@@ -25,36 +25,36 @@ Original = Callable[..., Any]
 
 
 def gives(value: Any) -> Off:
-    """Return a function that takes the place of a rule, and returns a constant."""
+    """Return a substitute of a rule that returns a constant."""
     return lambda original, *args, **options: value
 
 
 def same(original: Original, first: Any, *args: Any, **options: Any) -> Any:
-    """Take the place of a rule that changes its argument: return the argument."""
+    """Substitute a rule that changes its argument: return the argument."""
     return first
 
 
 def second(original: Original, first: Any, argument: Any, *args: Any, **options: Any) -> Any:
-    """Take the place of a method that changes its argument: return the argument."""
+    """Substitute a method that changes its argument: return the argument."""
     return argument
 
 
 def third(original: Original, first: Any, other: Any, argument: Any, *args: Any) -> Any:
-    """Take the place of a method that selects of its second argument: return it whole."""
+    """Substitute a method that selects from its second argument: return the argument."""
     return argument
 
 
 def idle(original: Original, *args: Any, **options: Any) -> None:
-    """Take the place of a rule that only adds fits to a beam."""
+    """Substitute a rule that only adds fits to a beam: do nothing."""
 
 
 @dataclass(frozen=True)
 class Rule:
-    """A rule, and the one place that switches it off.
+    """A rule, and the place that disables it.
 
-    `place` is "module:name" below `coupled.gap`, where the name is looked up; `off` takes the place
-    of the function there, is given the original and its arguments, or is the constant's other
-    value. With a `caller`, only calls by this function are without the rule.
+    `place` is "module:name" below `coupled.gap`, where the name is looked up; `off` replaces the
+    function and receives the original and its arguments, or is another value of a constant. With a
+    `caller`, only calls by this function are without the rule.
     """
 
     name: str
@@ -62,7 +62,7 @@ class Rule:
     off: Any
     what: str
     caller: str = ""
-    fresh: bool = False  # it acts before the search, or within a fit: nothing is used again
+    fresh: bool = False  # acts before the search, or within a fit: nothing is reused
 
     @property
     def after_search(self) -> bool:
@@ -168,7 +168,7 @@ RULES = (
 
 @contextmanager
 def patched(owner: Any, name: str, value: Any) -> Iterator[None]:
-    """Replace an attribute within the block."""
+    """Replace an attribute in this context."""
     before = vars(owner)[name]
     setattr(owner, name, value)
     try:
@@ -178,7 +178,7 @@ def patched(owner: Any, name: str, value: Any) -> Iterator[None]:
 
 
 def called_by(caller: str) -> bool:
-    """Tell whether the function that called a wrapper of this file has a name; "" is any."""
+    """Return whether the function that called a wrapper of this file has a name; "" is any."""
     frame = sys._getframe(1)
     while frame.f_code.co_filename == __file__ and frame.f_back is not None:
         frame = frame.f_back
@@ -186,13 +186,13 @@ def called_by(caller: str) -> bool:
 
 
 def function_of(attribute: Any) -> Any:
-    """Return the function of a property; another attribute as it is."""
+    """Return the function of a property; other attributes are returned unchanged."""
     return attribute.fget if isinstance(attribute, property) else attribute
 
 
 @contextmanager
 def without(rule: Rule) -> Iterator[None]:
-    """Switch a rule off within the block."""
+    """Disable a rule in this context."""
     owner, name = rule.owner()
     before = vars(owner)[name]
     if not callable(rule.off):
@@ -212,9 +212,9 @@ def without(rule: Rule) -> Iterator[None]:
 
 @contextmanager
 def watched(rules: Sequence[Rule], acted: set[str]) -> Iterator[None]:
-    """Add to `acted` the rules that change a result within the block.
+    """Add to `acted` the rules that change a result in this context.
 
-    A rule that is a constant counts as acting always.
+    A rule that is a constant always counts.
     """
     with ExitStack() as stack:
         for rule in rules:
@@ -227,7 +227,7 @@ def watched(rules: Sequence[Rule], acted: set[str]) -> Iterator[None]:
 
 
 def _watching(rule: Rule, before: Any, acted: set[str]) -> Any:
-    """Return a function or property that notes whether its rule acts."""
+    """Return a function or property that records whether its rule acts."""
     original = function_of(before)
 
     def call(*args: Any, **options: Any) -> Any:
@@ -248,7 +248,7 @@ def _watching(rule: Rule, before: Any, acted: set[str]) -> Any:
 
 
 def differs(one: Any, other: Any) -> bool:
-    """Tell whether two results of a rule's function differ; true if they cannot be compared."""
+    """Return whether two results of a rule's function differ; true if they cannot be compared."""
     if one is other:
         return False
     if isinstance(one, Worth) and isinstance(other, Worth):

@@ -6,6 +6,6 @@ from coupled.blind.trials.answers import Answer
 
 
 def is_right(answer: Answer) -> bool:
-    """Tell whether an answer is right by its record's kind."""
+    """Return whether an answer is correct for the kind of its record."""
     wanted = {"none": "no_gap", "outsider": "unexplained"}.get(answer.truth.category)
     return answer.exact if wanted is None else answer.verdict == wanted

@@ -15,7 +15,7 @@ Floats = NDArray[np.float64]
 POOL = read_deck(1).rigs
 STEP_N = 20.0
 RATE_Hz = 120
-# Effects that no twin has: of a joint that turns, of an imposed motion, and of an aircraft moved by
+# Effects that no twin has: of a rotating joint, of an imposed motion, and of an aircraft moved by
 # all controls.
 WITHOUT_TWIN = {
     *("gravity", "yielding_contact", "regressor_force", "regressor_friction"),

@@ -1,4 +1,4 @@
-"""Wrong values and structured damage for fuzzing: of calls, of JSON and TOML tables, of XML."""
+"""Wrong values and structural damage for fuzzing: of calls, of JSON and TOML tables, of XML."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ import polars as pl
 
 import coupled
 
-# What a program may hand over by mistake in place of any argument.
+# Objects that a program may pass by mistake as any argument.
 VALUES: tuple[Any, ...] = (
     *(None, True, 0, -1, 3, 10**400, 1.5, float("nan"), float("inf"), -1e300, 1 + 2j),
     *("", "x", "t37", "\0", "a" * 5000, "../..", "no/such.csv", "\x1b[31m", b"x"),
@@ -29,7 +29,7 @@ VALUES: tuple[Any, ...] = (
     *(pl.DataFrame({"time_s": [1.0, 0.0], "a": [1, 2]}), pl.Series([1.0])),
 )
 
-# What another program may write in place of a value of JSON or TOML.
+# Values that another program may write in JSON or TOML.
 PLAIN: tuple[Any, ...] = (
     *(None, True, 0, -1, 7, 10**400, 1.5, -1e300, 5e-324, float("nan"), float("inf")),
     *("", "x", "\0", "\u202e", "a" * 3000, [], [[]], [None], [1, "a"], {}, {"a": {}}, {"": []}),
@@ -37,7 +37,7 @@ PLAIN: tuple[Any, ...] = (
 
 
 def places(table: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
-    """Yield the place of each value in nested tables and lists, itself included."""
+    """Yield the path of each value in nested tables and lists, including the whole."""
     yield path
     if isinstance(table, dict):
         for key, value in table.items():
@@ -48,7 +48,7 @@ def places(table: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
 
 
 def damaged(table: Any, rng: random.Random, values: tuple[Any, ...] = PLAIN) -> Any:
-    """Return nested tables with one to three values replaced, left out, renamed or nested."""
+    """Return nested tables with one to three values replaced, omitted, renamed or nested."""
     found = copy.deepcopy(table)
     for _ in range(rng.choice((1, 1, 1, 2, 3))):
         path = rng.choice(list(places(found)))
@@ -79,7 +79,7 @@ def unexpected(error: BaseException) -> str:
     return f"{type(error).__name__}: {error}"
 
 
-# What may stand in an aircraft's XML by mistake, of which some end JSBSim.
+# Faults in an aircraft's XML, some of which crash JSBSim.
 WORDS = (
     *("", "abc", "nan", "1e999", "-1", "no/such", "a[99999999]", "a[-1]", "aero/alpha-rad["),
     *("/", "//", "1/2", "a b", "aero/alpha-rad", "velocities/q-rad_sec", "-", "1,5", "é", "0x1"),
@@ -113,7 +113,7 @@ def damaged_xml(text: bytes, rng: random.Random) -> bytes:
 
 
 def _torn(text: bytes, rng: random.Random) -> bytes:
-    """Return text that is no longer XML, or declares another encoding."""
+    """Return text that is not valid XML, or declares another encoding."""
     at = rng.randrange(len(text))
     encodings = (b"utf-16", b"no-such", b"utf-7", b"cp037", b"big5")
     head = b'<?xml version="1.0" encoding="%s"?>\n' % rng.choice(encodings)

@@ -1,7 +1,7 @@
 """Diagnoses of a twin's presliding friction, over friction and presliding length.
 
-`python -m tests.support.yielding` prints a table: what each is named, how sure, and how far off
-the friction is. `--laws` has LuGre's bristles too, and the elastoplastic ones of three shares.
+`python -m tests.support.yielding` prints a table: the effect found, its probability, and the error
+of the friction. `--laws` adds LuGre's bristles, and elastoplastic ones with three shares.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ def cases() -> list[Case]:
 def found_of(case: Case) -> Diagnosis:
     """Return the diagnosis of 20 to 30 s of a bench with this friction.
 
-    By the twin's own integrator, which shares nothing with that of the rig.
+    The record is by the twin's own integrator.
     """
     rig = read_deck(2).rigs["bench-rigid"]
     seed = [9, round(10.0 * case.friction_N), round(1e6 * case.travel_m)]

@@ -1,4 +1,4 @@
-"""The rig for small motions about rest: each curve as the number that its slope there is."""
+"""The rig for small motions about rest: each curve replaced by its slope there."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from coupled.rig.curves import Curve, FrictionCurve, curves_of
 from coupled.rig.parameters import Control
 from coupled.rig.rig import Rig
 
-# By section and curve: the number that a slope is added to, or multiplied by of a map.
+# By section and curve: the parameter to which the slope is added, or which it multiplies.
 _NUMBERS: Mapping[tuple[str, str], str] = {
     ("loader", "force_curve"): "basic_gradient_N_per_{d}",
     ("loader", "friction_curve"): "damping_N_s_per_{d}",
@@ -34,10 +34,10 @@ def slope_at_rest(curve: Curve) -> float:
 
 
 def about_rest(rig: Rig) -> Rig:
-    """Return the rig with its curves replaced by their slopes at rest; itself without curves.
+    """Return the rig with its curves replaced by their slopes at rest; unchanged without curves.
 
     A curve over q̄ stays, and those of dry friction and of the command do not act on small motions.
-    Raises InputError where a slope leaves no damping, spring or bend.
+    Raises InputError if a slope gives a nonpositive damping, spring or bend.
     """
     changes: dict[str, Any] = {}
     for name, control in rig.controls.items():

@@ -204,7 +204,7 @@ def _inertia_there(control: Control, gradient: float, d: str) -> dict[str, Any]:
 
 
 @dataclass(frozen=True)
-class Along:
+class PlaneAtGradient:
     """The rigs of a plane at one gradient, in N/d; the linear rig is made once."""
 
     rig: Rig
@@ -270,7 +270,7 @@ def plane(rig: Rig, name: ControlName, kind: Kind) -> Plane:
 
 
 def _by_theory(rig: Rig, name: ControlName, kind: Kind, gradients: Floats, ys: Floats) -> Floats:
-    along = [Along(rig, name, kind, gradient) for gradient in gradients.tolist()]
+    along = [PlaneAtGradient(rig, name, kind, gradient) for gradient in gradients.tolist()]
     return np.array([growths([at.linear_with(y) for y in ys.tolist()]) for at in along])
 
 
@@ -278,7 +278,7 @@ def simulated_along(
     rig: Rig, name: ControlName, kind: Kind, gradient: float, values: Floats
 ) -> Floats:
     """Return the simulated growth at each value of a plane's second quantity, 1/s."""
-    at = Along(rig, name, kind, gradient)
+    at = PlaneAtGradient(rig, name, kind, gradient)
     return np.array([at.simulated(value) for value in values.tolist()])
 
 
@@ -286,7 +286,7 @@ def crossings(
     rig: Rig, name: ControlName, kind: Kind, gradient: float, values: Floats, simulated: Floats
 ) -> list[Crossing]:
     """Return where the growth, given as simulated, changes its sign along `values`."""
-    found, along = [], Along(rig, name, kind, gradient)
+    found, along = [], PlaneAtGradient(rig, name, kind, gradient)
     share = gradient * rig.controls[name].loader.bend
     last = len(values) - 1
     for j in np.flatnonzero((simulated[:-1] > 0.0) != (simulated[1:] > 0.0)).tolist():

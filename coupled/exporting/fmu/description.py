@@ -23,7 +23,7 @@ _BASE: dict[str, dict[str, int]] = {
     "Hz": {"s": -1},
     "V": {"kg": 1, "m": 2, "s": -3, "A": -1},
 }
-_PLAIN = ("g", "norm", "bits")  # of a load factor, of the whole travel: without a dimension
+_PLAIN = ("g", "norm", "bits")  # dimensionless units
 
 
 class Unit(NamedTuple):
@@ -53,7 +53,7 @@ def unit(key: str) -> Unit:
 
 
 class Model(NamedTuple):
-    """What a model description states of an FMU beside its variables."""
+    """The attributes of a model description, without its variables."""
 
     name: str
     identifier: str

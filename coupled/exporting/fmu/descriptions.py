@@ -1,4 +1,4 @@
-"""What the variables of an FMU are: one line each, as the model description has it."""
+"""The one-line descriptions of the variables in the model description of an FMU."""
 
 from __future__ import annotations
 

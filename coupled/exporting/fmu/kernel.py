@@ -1,7 +1,7 @@
 """The machine code of an FMU: a frame of one control, and the numbers of its parameters.
 
-Both are compiled from the stages that fly. They take addresses of flat memory, allocate nothing and
-keep nothing, so that instances share only the code.
+Both are compiled from the kernels of the simulation. They take addresses of flat memory, allocate
+nothing and have no state, so that instances share only the code.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""From a rig file's numbers to those of the kernels, where an FMU changes them in flight.
+"""The kernels' numbers as functions of rig file numbers that an FMU may change in flight.
 
-`pack` makes the kernels' numbers in Python, by the stages' declarations. Most are a number of the
-file as it is. The laws of the others are listed here, so that an FMU computes them without Python.
-`numbers` compares both for the exported rig.
+`pack` computes the kernels' numbers in Python, by the declarations of the stages. Most are a number
+of the file, unchanged. The functions for the others are listed here, so that an FMU computes them
+without Python. `numbers` compares both for the exported rig.
 """
 
 from __future__ import annotations

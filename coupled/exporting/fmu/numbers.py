@@ -1,8 +1,8 @@
 """The parameters of an FMU: the numbers of the rig file that may change in flight.
 
-A number may change if the laws give all that `pack` makes of it, at other values too. Others are
-constant in the FMU: those that change the structure of the loader, and those of exact maps over a
-step, such as a servo's frequency.
+A number may change if the laws reproduce `pack` at other values too. Others are constant in the
+FMU: those that change the structure of the loader, and those of exact maps over a step, such as the
+frequency of a servo.
 """
 
 from __future__ import annotations
@@ -24,22 +24,22 @@ from coupled.rig.rig import Rig
 from coupled.schema import LARGEST, file_keys
 
 Words = NDArray[np.int64]
-AGREES = 1e-12  # relative: the laws round otherwise than `pack`
-_SMALL = 0.01  # a value that is tried in place of 0
-# Their history is not kept while they are 0.
+AGREES = 1e-12  # relative; the rounding of the laws differs from `pack`
+_SMALL = 0.01  # a trial value instead of 0
+# Their history is not stored while they are 0.
 _WITH_HISTORY = ("loader.delay", "loader.servo_delay", "sensing.gauge_delay")
 _RISING = ("schedule.dynamic_pressure", "compensation.inertia_gradient")
 
 
 class Bounds(NamedTuple):
-    """The range of a number; `above`: without its least value."""
+    """The range of a number; `above` excludes the least value."""
 
     least: float = -LARGEST
     most: float = LARGEST
     above: bool = False
 
     def include(self, value: float) -> bool:
-        """Tell whether a value is within the range."""
+        """Return whether a value is within the range."""
         return self.least <= value <= self.most and not (self.above and value == self.least)
 
 
@@ -151,7 +151,7 @@ def _bounds(rig: Rig, data: Control, name: str) -> Bounds:
 def _usable(
     rig: Rig, control: str, name: str, bounds: Bounds, known: Mapping[str, Law]
 ) -> Bounds | None:
-    """Return the range in which the laws give what `pack` makes of a number; None for none."""
+    """Return the range in which the laws reproduce `pack` for a number; None if there is none."""
     data = rig.controls[cast(ControlName, control)]
     now = value(data, name)
     if name in _WITH_HISTORY:
@@ -170,7 +170,7 @@ def _usable(
 
 
 def _agree(rig: Rig, control: str, name: str, to: float, known: Mapping[str, Law]) -> bool:
-    """Tell whether the laws give the kernels' numbers for another value of a number."""
+    """Return whether the laws reproduce `pack` for another value of a number."""
     data = rig.controls[cast(ControlName, control)]
     changed = _changed(data, name, to)
     whole = _whole_words()
@@ -179,7 +179,7 @@ def _agree(rig: Rig, control: str, name: str, to: float, known: Mapping[str, Law
         for place, law in known.items():
             if name in law.of and not place.startswith("state."):
                 _write(found, place_of(place), law, changed)
-    except ZeroDivisionError:  # of a scale that cannot be 0
+    except ZeroDivisionError:  # a scale that cannot be 0
         return False
     near = np.isclose(found.view(np.float64), wanted.view(np.float64), rtol=AGREES, atol=0.0)
     return bool(np.where(whole, found == wanted, near).all())

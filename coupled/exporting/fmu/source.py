@@ -1,4 +1,4 @@
-"""The part of an FMU's C source that is the rig's: `model.h`."""
+"""The part of an FMU's C source that depends on the rig: `model.h`."""
 
 from __future__ import annotations
 

@@ -47,7 +47,7 @@ def variables(rig: Rig, control: str) -> list[Variable]:
 
 
 def needs_alpha(rig: Rig, control: str) -> bool:
-    """Tell whether a control's services depend on the angle of attack."""
+    """Return whether a control's services depend on the angle of attack."""
     services = rig.controls[cast(ControlName, control)].services
     return any((services.shaker_alpha, services.pusher_alpha, services.hinge_alpha))
 

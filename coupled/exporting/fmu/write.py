@@ -48,7 +48,7 @@ class Fmu:
         return f"Fmu({self.rig.name} {self.control}: FMI {self.fmi}.0, {self.platform}, {numbers})"
 
     def as_dict(self) -> dict[str, object]:
-        """Return what the FMU is, without its content, as JSON takes it."""
+        """Return the properties of the FMU, without its content, as JSON data."""
         names = {"inputs": self.inputs, "outputs": self.outputs, "parameters": self.parameters}
         return {
             "rig": self.rig.name,
@@ -62,7 +62,7 @@ class Fmu:
 
 
 def check_file(file: Path) -> None:
-    """Raise InputError for a file that is no FMU by its name, or cannot be written."""
+    """Raise InputError for a path that does not end in .fmu or cannot be written."""
     if file.suffix.lower() != ".fmu":
         raise InputError(file, "", "an FMU ends in .fmu")
     check_target(file)
@@ -118,7 +118,7 @@ def make_fmu(rig: Rig, control: str = "", fmi: Fmi = 3) -> Fmu:
 
 
 def write_fmu(made: Fmu, file: Path) -> None:
-    """Write an FMU, whole or not at all."""
+    """Write an FMU atomically."""
     write_whole(file, lambda part: part.write_bytes(made.content))
 
 

@@ -39,7 +39,7 @@ class Compensation:
     integral_per_s: float
 
 
-class Acting:
+class CompensationFilter:
     """The discrete filter of a compensation, with its state."""
 
     def __init__(self, pilot: Compensation, frame_s: float) -> None:
@@ -96,7 +96,7 @@ def delay_response(delay_s: float, frame_s: float, rate: float) -> complex:
 
 
 def compensation_response(pilot: Compensation, frame_s: float, rate: float) -> complex:
-    """Return the frequency response of `Acting` at a frequency in rad/s."""
+    """Return the frequency response of `CompensationFilter` at a frequency in rad/s."""
     slope = _slope(frame_s, rate)
     shape = (1.0 + pilot.lead_s * slope) / (1.0 + pilot.lag_s * slope)
     return pilot.gain * shape * (1.0 + pilot.integral_per_s / slope)

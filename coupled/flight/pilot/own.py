@@ -1,7 +1,7 @@
-"""Functions of the user's own, called once a frame: a pilot's force, or a scheduled gradient.
+"""User functions called once per frame: a pilot's force, or a scheduled gradient.
 
-A function maps the state at t_k, read by the host, to a number for the frame from t_k to t_k+1. One
-with a state of its own may have a function `reset`, which is called at the start of each flight.
+A function maps the state at t_k, read by the host, to a number for the frame from t_k to t_k+1. If
+it has a function `reset` as an attribute, that is called at the start of each flight.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ Law = Callable[[State], float]
 if TYPE_CHECKING:
     PilotOrLaw = Pilot
 else:
-    PilotOrLaw = Pilot | Law  # a manoeuvre may be given a function, and has a pilot
+    PilotOrLaw = Pilot | Law  # a manoeuvre also takes a function for a pilot
 _WANTED = "give a function of the state, as `lambda state: 50.0`"
 
 
@@ -37,7 +37,7 @@ class GivenForce(Pilot):
 
 
 class OwnPilot(GivenForce):
-    """A pilot of the user's own: `law` maps the state of a frame to the hand's force, N."""
+    """A pilot defined by a user function: `law` maps the state of a frame to a force, N."""
 
     kind: Literal["own"] = "own"
     law: Callable[..., Any]
@@ -49,16 +49,16 @@ class OwnPilot(GivenForce):
 
 
 def as_pilot(given: Any) -> Any:
-    """Return a pilot, or the pilot of a function."""
+    """Return a pilot, or the pilot of a function; other objects are returned unchanged."""
     if isinstance(given, (Pilot, type)) or not callable(given):
-        return given  # a manoeuvre refuses what is no pilot
+        return given  # refused by the manoeuvre
     return OwnPilot(law=given)
 
 
 def given_laws(
     column: Law | None, wheel: Law | None, pedals: Law | None, file: object
 ) -> dict[ControlName, Pilot]:
-    """Return the pilots of functions, by their controls; raises InputError for what is none."""
+    """Return the pilots of functions by control. Raises InputError for another type."""
     found: dict[ControlName, Pilot] = {}
     for control, law in zip(CONTROL_NAMES, (column, wheel, pedals), strict=True):
         if law is not None:
@@ -68,7 +68,7 @@ def given_laws(
 
 
 def check_pickled(pilots: Mapping[ControlName, Pilot], file: object) -> None:
-    """Raise InputError for a function that other processes cannot be given."""
+    """Raise InputError for a function that cannot be pickled, as other processes require."""
     for control, pilot in pilots.items():
         try:
             pickle.dumps(pilot)
@@ -79,27 +79,27 @@ def check_pickled(pilots: Mapping[ControlName, Pilot], file: object) -> None:
 
 
 def name_of(law: object) -> str:
-    """Return the name of a user's function, for messages."""
+    """Return the name of a user function, for messages."""
     own = getattr(law, "__qualname__", type(law).__qualname__)
     return shown(str(own).rpartition("<locals>.")[2], 60)
 
 
 def check_law(law: object, file: object, place: str) -> None:
-    """Raise InputError for what is no function of a state; `place` is its key."""
+    """Raise InputError for an object that is not a function of a state; `place` is its key."""
     if isinstance(law, type) or not callable(law):
         what = f"the class {law.__name__}" if isinstance(law, type) else shown_value(law)
         raise InputError(file, place, f"is {what}; {_WANTED}")
 
 
 def reset_law(law: Any) -> None:
-    """Call a function's own `reset`, if it has one."""
+    """Call the `reset` of a function, if it has one."""
     reset = getattr(law, "reset", None)
     if callable(reset):
         reset()
 
 
 def force_of(law: Law, state: State, file: object, control: str) -> float:
-    """Return a pilot's force, N; raises InputError for what is no force of a hand."""
+    """Return a pilot's force, N. Raises InputError for an impossible force."""
     force = _number(law, state, file, f"pilot.{control}", "a force in N")
     if not -STRONGEST <= force <= STRONGEST:
         problem = f"{name_of(law)} returned {force:g} N {time_of(state)}; give at most"
@@ -119,10 +119,10 @@ def gradient_of(law: Law, state: State, file: object, control: ControlName, most
 
 
 def _number(law: Law, state: State, file: object, place: str, wanted: str) -> float:
-    """Return what a function gives for a state, as a finite number."""
+    """Return the value of a function for a state, as a finite number."""
     try:
         value: object = law(state)
-    except Exception as error:  # the user's own, with where it happened
+    except Exception as error:  # an error of the user's function, with its location
         error.add_note(f"in {name_of(law)}, {file}: {place}, {time_of(state)}")
         raise
     if type(value) is not float:

@@ -34,8 +34,8 @@ from coupled.flight.pilot.base import (
     turned,
 )
 from coupled.flight.pilot.crossover import (
-    Acting,
     Compensation,
+    CompensationFilter,
     Delay,
     Remnant,
     adapt,
@@ -181,7 +181,7 @@ class Track(Pilot):
             assert rig.flight is not None
             file = start.rig_file
             answer = control_response(rig.flight, frame_s, controls, control, file, rate)
-            limbs = self._limbs(rig, control, answer.pressure_Pa, rate)
+            limbs = self._arm_gain(rig, control, answer.pressure_Pa, rate)
             limbs *= delay_response(self.delay_s, frame_s, rate)
             sign = -1.0 if what in _LESSENED else 1.0
             return sign * limbs * _motion(answer, what)
@@ -214,7 +214,7 @@ class Track(Pilot):
         outer = adapted("", closed, *own)
         return inner, replace(outer, gain=sign * outer.gain)
 
-    def _limbs(self, rig: Rig, name: ControlName, pressure_Pa: float, rate: float) -> complex:
+    def _arm_gain(self, rig: Rig, name: ControlName, pressure_Pa: float, rate: float) -> complex:
         """Return the surface command per newton of the pilot's, on the specified rig."""
         control, s, frame_s = rig.controls[name], 1j * rate, 1.0 / rig.frame_rate
         loader, rigging = control.loader, control.rigging
@@ -257,8 +257,8 @@ class Track(Pilot):
         """Return the pilot's function of time and motion, with its own state."""
         frame_s, what = 1.0 / rig.frame_rate, self.follows(control)
         through = _THROUGH.get(control, what)
-        inner, late = Acting(on_attitude, frame_s), Delay(self.delay_s, frame_s)
-        outer = Acting(around, frame_s) if around is not None else None
+        inner, late = CompensationFilter(on_attitude, frame_s), Delay(self.delay_s, frame_s)
+        outer = CompensationFilter(around, frame_s) if around is not None else None
         remnant = Remnant(self.remnant, self.lag_s, frame_s, seed)
         found: tuple[float, float] | None = None
         before = math.nan
@@ -269,19 +269,19 @@ class Track(Pilot):
             before = motion[ALTITUDE]
             if time < self.start_s:
                 return 0.0
-            now = (_seen(motion, path, through), _seen(motion, path, what))
+            now = (_tracked_value(motion, path, through), _tracked_value(motion, path, what))
             found = now if found is None else found
-            attitude = _away(found[0], now[0], through)
+            attitude = _deviation(found[0], now[0], through)
             asked = float(self.target(np.array([time]))[0])
             if outer is not None:
-                asked = outer(asked - _away(found[1], now[1], what))
+                asked = outer(asked - _deviation(found[1], now[1], what))
             error = asked - attitude
             return inner(late(error + remnant(error)))
 
         return look
 
 
-def _seen(motion: tuple[float, ...], path_rad: float, what: What) -> float:
+def _tracked_value(motion: tuple[float, ...], path_rad: float, what: What) -> float:
     """Return the tracked quantity, rad or m/s."""
     if what == "flight_path":
         return path_rad
@@ -289,7 +289,7 @@ def _seen(motion: tuple[float, ...], path_rad: float, what: What) -> float:
     return motion[(places | {"heading": HEADING, "sideslip": SIDESLIP})[what]]
 
 
-def _away(found: float, now: float, what: What) -> float:
+def _deviation(found: float, now: float, what: What) -> float:
     """Return the deviation of the tracked quantity from its start; a heading the shorter way."""
     return turned(found, now) if what in ("roll", "heading") else now - found
 

@@ -1,6 +1,6 @@
 /* A loader's end of the open protocol between coupled and a control loader, version 1.
  *
- * C99, no heap, no operating system: give it the bytes that came, send the bytes it makes. Copy
+ * C99, no heap, no operating system: it parses received bytes and writes bytes to send. Copy
  * this file. All numbers of the wire are little-endian; floats are IEEE 754 of 32 bits, SI.
  *
  *     coupled_loader loader;
@@ -10,7 +10,7 @@
  *     ... each loader step: const coupled_order *o = coupled_orders(&loader, now_us);
  *                             F_mod = coupled_force(&o[0], computed);
  *
- * Without a packet for 100 ms, or when the host says "off", the orders are zero.
+ * Without a packet for 100 ms, or if the mode of the host is "off", the orders are zero.
  */
 #ifndef COUPLED_LOADER_H
 #define COUPLED_LOADER_H
@@ -86,7 +86,7 @@ static int coupled_quiet(const coupled_loader *loader, uint64_t now_us) {
     return !loader->heard || now_us - loader->heard_us > COUPLED_WATCHDOG_us;
 }
 
-/* Takes a datagram of the host; returns 1 where it is valid and new, and wants an answer. */
+/* Parses a datagram of the host; returns 1 if it is valid and new, and must be answered. */
 static int coupled_take(coupled_loader *loader, const uint8_t *bytes, size_t size,
                         uint64_t now_us) {
     size_t wanted = COUPLED_HEADER_bytes + 28u * (size_t)loader->controls + 4u;
@@ -123,14 +123,14 @@ static int coupled_take(coupled_loader *loader, const uint8_t *bytes, size_t siz
     return 1;
 }
 
-/* Returns the orders that hold now, one a control; zero where the host is silent or off. */
+/* Returns the current orders, one per control; zero if the host is silent or off. */
 static const coupled_order *coupled_orders(coupled_loader *loader, uint64_t now_us) {
     if (coupled_quiet(loader, now_us) || loader->mode == COUPLED_OFF)
         memset(loader->orders, 0, sizeof loader->orders);
     return loader->orders;
 }
 
-/* Returns F_mod in N at a deflection: what an analog multiplier would make of the orders. */
+/* Returns F_mod in N at a deflection, as an analog multiplier with these orders gives it. */
 static float coupled_force(const coupled_order *order, float computed) {
     float force = order->gradient * computed;
     float size = computed < 0.0f ? -computed : computed;

@@ -1,11 +1,11 @@
-/* A loader to try the open protocol with, on any system with BSD sockets:
+/* An example loader with the open protocol, for any system with BSD sockets:
  *
  *     cc -std=c99 -O2 -o loader loader.c -lm && ./loader 5760
  *
  * It simulates one control, m·x'' + c·x' + G·x + F_mod = F, moved by a hand of 20 N at 0.4 Hz that
  * begins 2 s after the host's forces are on. It steps a 120th of a second for each packet of the
- * host, so that a host in lock-step may fly it as fast as it likes. On a microcontroller, keep
- * coupled_loader.h and put your own converters in the place of `advance`.
+ * host, so that a host in lock-step can run at any speed. On a microcontroller, keep
+ * coupled_loader.h and replace `advance` by your own converters.
  */
 #define _POSIX_C_SOURCE 200809L
 
@@ -55,7 +55,7 @@ int main(int count, char **words) {
     coupled_loader loader;
     control column = {0};
     int quiet = 0, wire = socket(AF_INET, SOCK_DGRAM, 0);
-    here.sin_addr.s_addr = htonl(INADDR_LOOPBACK); /* change it to hear a host elsewhere */
+    here.sin_addr.s_addr = htonl(INADDR_LOOPBACK); /* change it for a host elsewhere */
     here.sin_port = htons((uint16_t)(count > 1 ? atoi(words[1]) : 5760));
     if (wire < 0 || bind(wire, (struct sockaddr *)&here, sizeof here) != 0) {
         perror("loader");

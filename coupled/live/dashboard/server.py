@@ -155,7 +155,7 @@ class Server:
         return secrets.compare_digest(token.encode(), self._served_at.token.encode())
 
     def _own_host(self, host: str) -> bool:
-        """Tell whether the Host header names this server (protection from DNS rebinding)."""
+        """Return whether the Host header names this server (protection from DNS rebinding)."""
         name = host.rpartition(":")[0].strip("[]")
         if self._served_at.address in ("0.0.0.0", "::"):
             return bool(name)

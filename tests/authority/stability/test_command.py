@@ -15,7 +15,7 @@ from coupled.authority.stability.linear import (
     growth,
 )
 from coupled.authority.stability.planes import (
-    Along,
+    PlaneAtGradient,
     plane,
 )
 from coupled.cli import app
@@ -40,7 +40,7 @@ def test_a_plane_holds_cells_and_limits(coarse: None) -> None:
     for crossing in found.crossings:
         assert crossing.difference is not None
         assert crossing.difference < 0.01
-        along = Along(bench(), "column", "frame", crossing.share / K_REPORT)
+        along = PlaneAtGradient(bench(), "column", "frame", crossing.share / K_REPORT)
         rig, hand = along.linear_with(crossing.simulated)
         assert growth(rig, hand) == pytest.approx(0.0, abs=0.1)
 

@@ -15,8 +15,8 @@ from coupled.authority.stability.linear import (
     mass_limit,
 )
 from coupled.authority.stability.planes import (
-    Along,
     Kind,
+    PlaneAtGradient,
     axis,
     crossings,
     linear_rig,
@@ -107,7 +107,7 @@ def test_a_slow_gauge_brings_the_limit_of_a_hand_and_of_the_grips_mass_down() ->
 @pytest.mark.parametrize("kind", ["gauge", "frame"])
 def test_growths_found_at_once_are_those_found_one_by_one(kind: Kind) -> None:
     """A hybrid multiplier's and a digital one's."""
-    along = Along(bench(), "column", kind, 0.5 / K_REPORT)
+    along = PlaneAtGradient(bench(), "column", kind, 0.5 / K_REPORT)
     linear_with = [along.linear_with(value) for value in axis(kind, 12).tolist()]
     assert growths(linear_with) == [growth(rig, hand) for rig, hand in linear_with]
     assert growths([*linear_with, (along.linear, Hand())])[:-1] == growths(linear_with)

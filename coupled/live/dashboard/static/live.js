@@ -1,5 +1,5 @@
 "use strict";
-// The page: takes rows of the flight and the state of things, draws, and says what is asked for.
+// The page: draws rows and state of the flight, and sends the user's requests.
 
 const FLIGHT = 9, PER = 6, HISTORY_s = 60, LOOP_s = 10;
 const by = id => document.getElementById(id);

@@ -16,9 +16,9 @@ from pathlib import Path
 
 import pytest
 
+from coupled.callpool import call_pool
 from coupled.errors import InputError
 from coupled.parallel import in_threads, in_turn, threads
-from coupled.turns import turns
 
 
 def where(_: int = 0) -> int:
@@ -86,7 +86,7 @@ def test_work_may_end_while_a_process_still_loads() -> None:
 def test_one_thread_starts_no_process() -> None:
     with threads(1):
         assert places(where) == {os.getpid()}
-    with threads(2), turns(0) as none:
+    with threads(2), call_pool(0) as none:
         assert none.call(partial(where)) == os.getpid()
 
 
@@ -118,7 +118,7 @@ def test_a_script_is_not_run_again_by_the_process_beside_it(by: str, tmp_path: P
     script = """
 from pathlib import Path
 from coupled.parallel import threads
-from tests.test_turns import until_beside
+from tests.test_callpool import until_beside
 with Path("runs").open("a") as runs:
     runs.write("once ")
 with threads(2):

@@ -1,4 +1,4 @@
-"""What befalls an exported aircraft by its script, beside our own flight of the same run."""
+"""The adverse conditions in an exported script, compared with our own flight of the same run."""
 
 from __future__ import annotations
 

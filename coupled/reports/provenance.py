@@ -1,4 +1,4 @@
-"""What made a report: the command, the versions of what ran, and the files that went in."""
+"""The provenance of a report: the command, software versions, and input files."""
 
 from __future__ import annotations
 
@@ -8,20 +8,20 @@ from pathlib import Path
 
 from coupled.files import read_text, sha256
 from coupled.flight.manifest import versions
-from coupled.reports.page import InputFile, Made
+from coupled.reports.page import InputFile, Provenance
 
 _READ_BY_PEOPLE = ".toml"
 
 
-def made_by(command: str, inputs: Iterable[Path]) -> Made:
-    """Return what made a report, of the command's words and the files that it read.
+def provenance_of(command: str, inputs: Iterable[Path]) -> Provenance:
+    """Return the provenance of a report: the command line, versions, and the files read.
 
-    A file is named without its folder, and once. Of a TOML file the text is kept: rig, run and
-    sweep files say with their units all that was set.
+    A file is named once, without its folder. The text of TOML files is included, since rig, run and
+    sweep files contain all settings with their units.
     """
     files = {path.resolve(): path for path in inputs if path.is_file()}
     ran = {**versions(), "matplotlib": version("matplotlib")}
-    return Made(command, tuple(ran.items()), tuple(_input(path) for path in files.values()))
+    return Provenance(command, tuple(ran.items()), tuple(_input(path) for path in files.values()))
 
 
 def _input(path: Path) -> InputFile:

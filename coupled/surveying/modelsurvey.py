@@ -39,25 +39,25 @@ class Survey(Sequence[Surveyed], Displayed, Tabular):
         return f"Survey({len(self.models)} models, {trimmed} trim)"
 
     def as_dict(self) -> list[dict[str, Any]]:
-        """Return the findings of each model, as JSON takes them."""
+        """Return the results of each model as JSON data."""
         return [one.as_dict() for one in self.models]
 
     def to_polars(self) -> pl.DataFrame:
-        """Return a row a model; SI."""
+        """Return one row per model; SI."""
         return frame_of(self.as_dict())
 
 
 def survey_models(
     names: Sequence[str] = (), workers: int = 0, progress: Progress | None = None
 ) -> Survey:
-    """Return what is found of some models, or of all that are known.
+    """Return the results of some models, or of all known models.
 
-    `names` are models, their files, or folders of models. `workers` are processes, 0 for one a
-    core. Raises InputError for any other name.
+    `names` are models, their files, or folders of models. `workers` is the number of processes, 0
+    for one per core. Raises InputError for other names.
     """
     chosen = chosen_models(names)
     found: list[Surveyed] = []
-    # A survey keeps a core busy, and each process holds a model: more than the cores only cost.
+    # Each process holds a model and keeps a core busy: more processes than cores cost memory only.
     count = 1 if len(chosen) < 4 else min(cores(workers), cores(0), len(chosen))
     with executor(count) as pool:
         for one in as_done(pool, survey, [(each,) for each in chosen], 2 * count):

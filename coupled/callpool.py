@@ -1,12 +1,12 @@
-"""Work that holds the interpreter, by threads that would only take turns with it.
+"""Calls of code that holds the GIL, run in parallel by worker processes.
 
-A flight of JSBSim lets no other thread of its process run. Of the calls that come while one is at
-work, others are therefore done in processes beside this one. They are started by the first call
-that would have to wait, and used as soon as they have loaded. Until then calls wait for each other.
-What a call returns does not depend on where it is done.
+A flight of JSBSim holds the global interpreter lock, so threads cannot run flights in parallel.
+`CallPool` runs one call in this process and further simultaneous calls in worker processes. The
+workers start when a call would first have to wait, and are used as soon as they have loaded. The
+result of a call does not depend on the process.
 
-Those processes load the module of the first call only. Those of `multiprocessing` load the main
-module too, which would run the outermost lines of a user's script again.
+A worker imports the module of the first call only. Workers of `multiprocessing` would also import
+the main module, and so run the top level of a user's script again.
 """
 
 from __future__ import annotations
@@ -25,32 +25,32 @@ from typing import Any, TypeVar
 
 T = TypeVar("T")
 Place = Callable[[partial[Any]], Any]
-_BEGIN = "import sys; sys.path[:] = {path}; from coupled.turns import serve; serve({module!r})"
-_here = Lock()
+_BEGIN = "import sys; sys.path[:] = {path}; from coupled.callpool import serve; serve({module!r})"
+_this_process = Lock()
 
 
 class _LostError(Exception):
-    """The process that was to do a call is gone."""
+    """The worker process of a call has ended."""
 
 
-def _work_here(work: partial[T]) -> T:
-    with _here:
+def _call_in_this_process(work: partial[T]) -> T:
+    with _this_process:
         return work()
 
 
-class Turns:
-    """The places where calls are done: this process, and up to so many beside it."""
+class CallPool:
+    """A pool of this process and at most `workers` worker processes, one call in each at a time."""
 
-    def __init__(self, beside: int = 0) -> None:
+    def __init__(self, workers: int = 0) -> None:
         self._idle: SimpleQueue[Place] = SimpleQueue()
-        self._idle.put(_work_here)
-        self._beside = beside  # processes that may still be started
+        self._idle.put(_call_in_this_process)
+        self._beside = workers  # workers that may still be started
         self._started: list[subprocess.Popen[bytes]] = []
         self._starting: list[Thread] = []
         self._lock = Lock()
 
     def call(self, work: partial[T]) -> T:
-        """Return what `work` gives, and raise what it raises; here, if it cannot be pickled."""
+        """Return `work()`, or raise its exception; unpicklable work runs in this process."""
         try:
             place = self._idle.get_nowait()
         except Empty:
@@ -59,7 +59,7 @@ class Turns:
         try:
             found: T = place(work)
         except _LostError:
-            return self.call(work)  # at another place
+            return self.call(work)  # in another process
         except BaseException:
             self._idle.put(place)
             raise
@@ -67,7 +67,7 @@ class Turns:
         return found
 
     def _start(self, module: str) -> None:
-        """Start the processes that may still be started, and let them load a module."""
+        """Start the remaining workers, which load a module."""
         with self._lock:
             wanted, self._beside = self._beside, 0
             for _ in range(wanted):
@@ -75,16 +75,16 @@ class Turns:
                 self._starting[-1].start()
 
     def _start_one(self, module: str) -> None:
-        """Start a process, in a thread of its own, and offer it as a place when it has loaded."""
+        """Start a worker from a thread, and add it to the idle callers when it has loaded."""
         path = [str(one) for one in sys.path]
         command = [sys.executable, "-c", _BEGIN.format(path=path, module=module)]
-        apart: dict[str, Any] = {"start_new_session": True}  # the terminal interrupts this one only
+        apart: dict[str, Any] = {"start_new_session": True}  # no Ctrl-C from the terminal
         if sys.platform == "win32":
             apart = {"creationflags": subprocess.CREATE_NO_WINDOW}
         pipe = subprocess.PIPE
-        with suppress(OSError, EOFError):  # it cannot be started, or ends as it loads
+        with suppress(OSError, EOFError):  # the worker cannot be started, or ends while loading
             with self._lock:
-                if self._beside < 0:  # closed meanwhile
+                if self._beside < 0:  # closed in the meantime
                     return
                 process = subprocess.Popen(command, stdin=pipe, stdout=pipe, **apart)
                 self._started.append(process)
@@ -92,14 +92,14 @@ class Turns:
             assert asked is not None and answered is not None
             pickle.load(answered)
 
-            def work_beside(work: partial[T]) -> T:
+            def call_in_worker(work: partial[T]) -> T:
                 try:
                     asked.write(pickle.dumps(work))
                     asked.flush()
                     found, fault = pickle.load(answered)
-                except Exception:  # the process is gone, or cannot be given the work
+                except Exception:  # the worker has ended, or the work cannot be pickled
                     raise _LostError from None
-                except BaseException:  # interrupted: the next answer would be this call's
+                except BaseException:  # interrupted: the answer would be read by the next call
                     process.kill()
                     raise
                 if fault is not None:
@@ -107,10 +107,10 @@ class Turns:
                 result: T = found
                 return result
 
-            self._idle.put(work_beside)
+            self._idle.put(call_in_worker)
 
     def close(self) -> None:
-        """End the processes."""
+        """Kill the workers."""
         with self._lock:
             self._beside = -1
         for process in self._started:
@@ -118,14 +118,14 @@ class Turns:
         for thread in self._starting:
             thread.join()
         for process in self._started:
-            with suppress(OSError), process:  # closes its pipes and waits for it
+            with suppress(OSError), process:  # closes the pipes and waits for the process
                 pass
 
 
 def serve(module: str) -> None:
-    """Do one call after another, until the other end of the pipe is closed."""
+    """Run calls read from standard input until it is closed; the main function of a worker."""
     asked, answered = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # what a library prints is no answer
+    os.dup2(2, 1)  # prints of a library go to stderr
     importlib.import_module(module)
 
     def answer(found: Any, fault: Exception | None) -> None:
@@ -138,15 +138,15 @@ def serve(module: str) -> None:
             work = pickle.load(asked)
             try:
                 found, fault = work(), None
-            except Exception as error:  # raised where the call was made
+            except Exception as error:  # raised again in the calling process
                 found, fault = None, error
             answer(found, fault)
 
 
 @contextmanager
-def turns(beside: int) -> Iterator[Turns]:
-    """Give the places of a piece of work, and end their processes with it."""
-    made = Turns(beside)
+def call_pool(workers: int) -> Iterator[CallPool]:
+    """Give a pool with at most `workers` workers, and close it at the end of the block."""
+    made = CallPool(workers)
     try:
         yield made
     finally:

@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from coupled.flight import putback
+from coupled.flight import modelreset
 from coupled.flight.addresses import neighbours
+from coupled.flight.aircraftcache import PUT_BACK_EXACTLY, AircraftCache, CachedAircraft, in_trim
 from coupled.flight.airframe import JSBSimAirframe
-from coupled.flight.kept import PUT_BACK_EXACTLY, AircraftCache, CachedAircraft, in_trim
 from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import Manoeuvre
 from coupled.rig.parameters import Flight
@@ -153,7 +153,7 @@ def test_a_reset_keeps_the_limits_of_a_stall() -> None:
 def test_an_aircraft_whose_stall_s_limits_are_not_found_is_not_kept(
     values: tuple[float, float], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(putback, "neighbours", lambda found, _: neighbours(found, values))
+    monkeypatch.setattr(modelreset, "neighbours", lambda found, _: neighbours(found, values))
     assert in_trim(made("c172p"), "any").kind is None
 
 

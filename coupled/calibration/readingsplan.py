@@ -1,4 +1,4 @@
-"""The readings to take, whole: the fewest that reach a precision, and what grids would give."""
+"""A plan of readings with its precision, and the precision of reading grids."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
-from coupled.calibration.crossed import crossed_forces, crossed_precision
+from coupled.calibration.crossforces import crossed_forces, crossed_precision
 from coupled.calibration.estimate import Instruments
 from coupled.calibration.form import form
 from coupled.calibration.plan import (
@@ -33,10 +33,10 @@ _SIZES = [(few, many) for few in range(2, 7) for many in range(2, 7)]
 
 @dataclass(frozen=True, repr=False)
 class ReadingsPlan(Displayed, Tabular):
-    """The readings that give K to a precision, by station, and how often each is taken.
+    """The readings that give K to a precision, by station, and the number of each.
 
-    `grids` are what grids of (gradients, deflections) would give; `others` half the 95 % interval
-    of the bend by each other control, in d/N, where forces are held on them.
+    `grids` is the precision of grids of (gradients, deflections); `others` half the 95 % interval
+    of the bend by each other control, in d/N, if forces are held on them.
     """
 
     rig: Rig
@@ -54,11 +54,11 @@ class ReadingsPlan(Displayed, Tabular):
         return f"ReadingsPlan({self.control}: {count} readings give K to ±{100 * half:.1f} %)"
 
     def form(self, system: System = "si") -> str:
-        """Return the form to fill in, a CSV, in the units of a system."""
+        """Return the CSV form of the plan, in the units of a system."""
         return form(self.chosen, self.control, self.looks, self.held, system)
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the plan as JSON takes it."""
+        """Return the plan as JSON data."""
         table: dict[str, Any] = {
             "half_width": self.reached.half_width,
             "bend": self.reached.bend,
@@ -72,7 +72,7 @@ class ReadingsPlan(Displayed, Tabular):
         return table | ({"bend_by_others_half_width": dict(self.others)} if self.held else {})
 
     def to_polars(self) -> pl.DataFrame:
-        """Return a row a station: its q̄ in Pa, gradient in N/d, deflection in d, force in N."""
+        """Return one row per station: q̄ in Pa, gradient in N/d, deflection in d, force in N."""
         return frame_of(self.as_dict()["readings"])
 
 
@@ -88,7 +88,7 @@ def plan_readings(
 ) -> ReadingsPlan:
     """Return the fewest readings whose 95 % interval of K is ± `share` of it.
 
-    `looks`: how often ruler and scale are read; `crossed_N` is held on each other control.
+    `looks` is the number of readings of ruler and scale; `crossed_N` is held on each other control.
     """
     grids = {}
     for done, (few, many) in enumerate(_SIZES):

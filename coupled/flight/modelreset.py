@@ -53,17 +53,17 @@ def stall_limits(fdm: Any, main: Path) -> Callable[[], None] | None:
 
 def put_back(fdm: Any) -> None:
     """Reset an aircraft's models and its initial conditions."""
-    _to_zero(fdm)
+    _zero_initial_conditions(fdm)
     fdm.reset_to_initial_conditions(0)
     fdm.reset_to_initial_conditions(_WITHOUT_RUN)
-    _to_zero(fdm)
+    _zero_initial_conditions(fdm)
 
 
-def _to_zero(fdm: Any) -> None:
+def _zero_initial_conditions(fdm: Any) -> None:
     for name in _ZEROS:
         fdm[f"ic/{name}"] = 0.0
 
 
-def tells(name: str) -> bool:
-    """Tell whether a property is part of the aircraft's state."""
+def is_state_property(name: str) -> bool:
+    """Return whether a property is part of the aircraft's state."""
     return not _TELLS_NOTHING(name)

@@ -1,4 +1,4 @@
-"""Readings as taken: v₁ against the deflection."""
+"""Calibration readings: v₁ and the force against the deflection."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     from coupled.calibration.readings import Readings
 
 
-def draw_taken(readings: Readings) -> Figure:
-    """Draw v₁ and the force against the deflection, a colour a gradient set."""
+def draw_raw_readings(readings: Readings) -> Figure:
+    """Draw v₁ and the force against the deflection, one colour per gradient set."""
     figure = Figure(figsize=(8.2, 3.6), layout="constrained")
     left, right = figure.subplots(1, 2)
     labels = np.array(readings.label)

@@ -13,7 +13,7 @@ from coupled.authority.stability.linear import growth, motion_matrix
 from coupled.authority.stability.planes import linear_rig
 from coupled.calibration.checks import swing_of
 from coupled.calibration.documentation import check_feel
-from coupled.calibration.letgo import LATE, scheduled
+from coupled.calibration.releaseschedule import LATE, schedule_for_release
 from coupled.calibration.specification import specified_rig
 from coupled.calibration.sweeps import Release
 from coupled.errors import InputError
@@ -102,7 +102,7 @@ def test_without_damping_and_servo_the_lead_is_the_closed_form() -> None:
             f"{HOST}.force_lead_lag_s": 1e-4,
         }
     )
-    found = scheduled(rig, "column").controls["column"].compensation
+    found = schedule_for_release(rig, "column").controls["column"].compensation
     assert found.force_lead is not None
     closed = math.sqrt(MASS / G_STIFF) / math.tan((1.0 + LATE) * math.asin(0.9))
     assert found.force_lead[0] == pytest.approx(closed, rel=0.05)
@@ -113,7 +113,7 @@ def test_a_compensated_release_passes_with_the_remedy_and_fails_without(name: st
     rig = read_rig(shipped_rigs()[name])
     before = [check for check in check_feel(rig, "column") if not check.passed]
     assert {check.name.split(",")[0] for check in before} == {"first zero crossing"}
-    remedied = scheduled(rig, "column")
+    remedied = schedule_for_release(rig, "column")
     assert all(check.passed for check in check_feel(remedied, "column"))
     # as data: through a rig file and back
     assert "force_lead_s" in rig_text(remedied, "remedied")
@@ -147,7 +147,7 @@ def test_in_flight_a_column_let_go_comes_back_when_specified() -> None:
         for name, each in (
             ("specified", specified),
             ("as filed", rig),
-            ("remedied", scheduled(rig, "column")),
+            ("remedied", schedule_for_release(rig, "column")),
         )
     }
     assert crossed["as filed"] > 1.15 * crossed["specified"]
@@ -188,7 +188,7 @@ def test_the_command_writes_the_rig_whose_releases_pass(tmp_path: Path) -> None:
     assert crossings
     assert all(check["passed"] for check in checks)
     written = read_rig(tmp_path / "new.toml")
-    assert written == scheduled(read_rig(shipped_rigs()["report-column"]), "column")
+    assert written == schedule_for_release(read_rig(shipped_rigs()["report-column"]), "column")
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""The authority maps of a rig, whole: what is lost, what was flown, and the stick forces."""
+"""The authority map of a rig: loss over q̄ and deflection, flown range, and stick forces."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ Progress = Callable[[str, int, int], None]
 
 @dataclass(frozen=True, repr=False)
 class AuthorityMap(TableResult):
-    """What a rig loses over q̄ and deflection, with what was flown; `feel` are the stick forces.
+    """The authority loss over q̄ and deflection, the flown range, and the stick forces (`feel`).
 
     `losses` has the maps of each control, `flown` q̄ in Pa and deflection in d, shape (2, points).
     `feel` is None without level trim of a column.
@@ -47,7 +47,7 @@ class AuthorityMap(TableResult):
         return f"AuthorityMap({self.rig.name}: lost {most})"
 
     def to_polars(self) -> pl.DataFrame:
-        """Return the losses, a row a point; a deflection is in the unit beside it."""
+        """Return the losses, one row per point; the unit of the deflection is in a column."""
         rows = [
             {
                 "control": one.control,
@@ -68,7 +68,7 @@ class AuthorityMap(TableResult):
 def map_rig(
     rig: Rig, records: Sequence[Record] | None = None, progress: Progress | None = None
 ) -> AuthorityMap:
-    """Return a rig's maps; `records` give the envelope flown, by default the rig's shipped runs."""
+    """Return the maps of a rig; the flown range is of `records`, or of the rig's shipped runs."""
 
     def tell(what: str, done: int, total: int) -> None:
         if progress is not None:

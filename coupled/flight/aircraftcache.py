@@ -1,15 +1,14 @@
-"""An aircraft kept between the flights of a sweep, reset and trimmed for each.
+"""A cache of a sweep's aircraft, which is reset and trimmed for each flight.
 
 To load a T-37 takes an eighth of a flight of 20 s. JSBSim's reset avoids this, but does not restore
-all state (`putback`). The moving aerodynamic reference point is not restored, and an awjsra's
+all state (`modelreset`). The moving aerodynamic reference point is not restored, and an awjsra's
 nozzles start from their last position, as each kinematic component does; with their position and
 the wind set back, the next trim still differs by 1e-14.
 
-So an aircraft is kept only for models for which a test has found each record to be the same to the
-byte after any earlier flight (`tests/flight/test_kept`), and only for flights that change nothing
-of it but its commands. In addition all properties are compared with those of the first trim, bit
-for bit, and a flight that ended early keeps no aircraft. If anything differs, the aircraft is
-loaded again.
+So an aircraft is kept only for models whose records do not depend on earlier flights, to the byte
+(`tests/flight/test_aircraftcache`), and only for flights that change nothing but its commands. In
+addition all properties are compared with those of the first trim, bit for bit, and a flight that
+ended early keeps no aircraft. If anything differs, the aircraft is loaded again.
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ from coupled.flight.airframe import JSBSimAirframe
 from coupled.flight.bench import Airframe
 from coupled.flight.everyframe import Read
 from coupled.flight.manoeuvre import Manoeuvre
-from coupled.flight.putback import tells
+from coupled.flight.modelreset import is_state_property
 from coupled.rig.parameters import Flight
 from coupled.rig.recorder import ZEROS
 
@@ -69,7 +68,7 @@ def in_trim(airframe: JSBSimAirframe, kind: Hashable) -> CachedAircraft:
     restart = airframe.restarter()
     if restart is None:
         return CachedAircraft(airframe)
-    found = (airframe.reader(name) for name in airframe.names() if tells(name))
+    found = (airframe.reader(name) for name in airframe.names() if is_state_property(name))
     reads = tuple(read for read in found if read is not None)
     cached = CachedAircraft(airframe, kind, reads, restart=restart)
     return replace(cached, trimmed=cached.state())

@@ -15,7 +15,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from coupled.calibration.assumed import real_scales
+from coupled.calibration.assumedscales import real_scales
 from coupled.calibration.errors_in_variables import expected_design
 from coupled.calibration.estimate import Estimate, Instruments
 from coupled.calibration.plan import USUAL_LOSS, Station
@@ -33,8 +33,8 @@ def crossed_forces(
 ) -> dict[ControlName, list[float]]:
     """Return the force on each other control at every station, N: +, − and mostly 0.
 
-    In turn +, 0, − and 0 on the first, and half as often on the second, so that no force is
-    correlated with this control's own or with another's. Empty for 0 N.
+    The sequence is +, 0, − and 0 on the first control, and half as fast on the second, so that no
+    force is correlated with this control's own or with another's. Empty for 0 N.
     """
     if strongest_N == 0.0:
         return {}

@@ -33,7 +33,7 @@ LATE = 0.06  # of the first crossing, within the rule's 10 %: a smaller lead ove
 _LONGEST_s = 0.2
 
 
-def scheduled(rig: Rig, control: ControlName) -> Rig:
+def schedule_for_release(rig: Rig, control: ControlName) -> Rig:
     """Return a compensated rig with mass, damping and lead scheduled by the specified gradient.
 
     The table has the least, middle and greatest gradient of its schedule, as the checks do.

@@ -53,7 +53,7 @@ def true_deflection(rig: Rig, control: ControlName, record: Record) -> Floats:
 
 
 def loader_rests(rig: Rig, control: ControlName, record: Record) -> bool:
-    """Tell whether a loader never leaves neutral, since the hand force is below the breakout.
+    """Return whether a loader never leaves neutral, since the hand force is below the breakout.
 
     Decided by δc. With presliding friction the loader moves slightly before it slips; then the
     forces decide. Not for a loader with services, which a jam may hold.

@@ -12,7 +12,7 @@ from coupled.calibration.bench import CalibrationBench, take_readings
 from coupled.calibration.calibrate import calibrate_control
 from coupled.calibration.calibrated import with_calibration
 from coupled.calibration.coverage import measure_coverage
-from coupled.calibration.crossed import crossed_forces, crossed_precision
+from coupled.calibration.crossforces import crossed_forces, crossed_precision
 from coupled.calibration.estimate import Instruments, perfect_instruments, usual_instruments
 from coupled.calibration.fit import ordinary
 from coupled.calibration.plan import stations

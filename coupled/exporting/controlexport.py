@@ -21,7 +21,7 @@ STILL_s = 1e-6  # the loader's step in a run of zero time, as in JSBSim's trim
 
 
 @dataclass(frozen=True)
-class Made:
+class ControlExport:
     """One control during its export.
 
     `substeps` of the loader in a run of JSBSim, `steps` of JSBSim in a frame of the host.
@@ -70,7 +70,7 @@ class Made:
         """Return a component's value of the last run, 0 in the first after a start."""
         return self.own("live") * self.own(name)
 
-    def once_a_frame(self, name: str, value: Value, says: str = "", out: str = "") -> Expr:
+    def add_at_frame(self, name: str, value: Value, says: str = "", out: str = "") -> Expr:
         """Add a component that the host sets at its frames, and holds in between."""
         if self.steps > 1:
             value = either(equal(self.own("clock"), 0.0), value, self.own(name))
@@ -81,7 +81,7 @@ class Made:
         return 1.0 - exponential(-(self.steps / lag_s) * DT)
 
 
-def add_clock(made: Made) -> None:
+def add_clock(made: ControlExport) -> None:
     """Add the time steps: whether JSBSim steps, the loader's step, the host's frame."""
     system = made.system
     system.channel("time", "A run of zero time (JSBSim's start and trim) resets all.")
@@ -100,6 +100,6 @@ def stepping() -> Expr:
     return Expr("gt", (DT, Expr("v", text="0.0")))
 
 
-def own_started(made: Made) -> Expr:
+def own_started(made: ControlExport) -> Expr:
     """Return whether the run before stepped."""
     return made.own("started")

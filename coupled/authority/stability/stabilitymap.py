@@ -1,4 +1,4 @@
-"""The stability of a rig, whole: limits at the stiffest gradient, and maps over K·G_T."""
+"""The stability of a rig: limits at the stiffest gradient, and maps over K·G_T."""
 
 from __future__ import annotations
 
@@ -37,9 +37,9 @@ QUANTITIES: dict[Kind, str] = {
 
 @dataclass(frozen=True, repr=False)
 class Stability(TableResult):
-    """Where a rig is stable: the limits of each control, and `planes` over K·G_T.
+    """The stability of a rig: the limits of each control, and maps (`planes`) over K·G_T.
 
-    `bob_weight` is the limit through the aircraft, None where there is none.
+    `bob_weight` is the limit through the aircraft, or None.
     """
 
     rig: Rig
@@ -49,17 +49,17 @@ class Stability(TableResult):
 
     @property
     def disagreement(self) -> Disagreement:
-        """How far simulated limits lie from those of linear theory."""
+        """The differences of simulated limits from those of linear theory."""
         return disagreement(self.planes)
 
     @property
     def stable(self) -> bool:
-        """Whether no value of the rig's own lies where it is unstable."""
+        """Whether all values of the rig are on the stable side."""
         return not any(limit.outside for control in self.limits for limit in control.limits)
 
     @property
     def by_control(self) -> dict[ControlName, list[Plane]]:
-        """The planes of each control."""
+        """The maps of each control."""
         names = dict.fromkeys(one.control for one in self.planes)
         return {name: [one for one in self.planes if one.control == name] for name in names}
 
@@ -69,7 +69,7 @@ class Stability(TableResult):
         return f"Stability({self.rig.name}: {names} {word}; {self.disagreement.words})"
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the limits as JSON takes them."""
+        """Return the limits as JSON data."""
         apart = self.disagreement
         return {
             "rig": self.rig.name,
@@ -79,7 +79,7 @@ class Stability(TableResult):
         }
 
     def to_polars(self) -> pl.DataFrame:
-        """Return the planes, a row a simulated cell."""
+        """Return the maps, one row per simulated cell."""
         return frame_of(
             [
                 {
@@ -102,9 +102,9 @@ class Stability(TableResult):
 def compliant_controls(
     rig: Rig, control: str | None = None, key: str = "control"
 ) -> list[ControlName]:
-    """Return the controls that bend, of one or of all.
+    """Return the controls with structural compliance, one or all.
 
-    Raises InputError, which names the control `key`, where the rig lacks it, or none bends.
+    Raises InputError for `key` if the rig does not have the control, or none has compliance.
     """
     file = Path(rig.place)
     rig.check_controlled(file)
@@ -123,7 +123,7 @@ def compliant_controls(
 def map_stability(
     rig: Rig, bent: Sequence[ControlName], progress: Progress | None = None
 ) -> Stability:
-    """Return where a rig is stable for small motions, on controls that bend."""
+    """Return the stability for small motions of the controls `bent`, which have compliance."""
     rig = about_rest(rig)
     asked = [(name, kind) for name in bent for kind in kinds_of(rig.controls[name])]
     limits = tuple(stability_limits(rig, name) for name in bent)

@@ -28,7 +28,7 @@ NEUTRAL = 0.01  # of travel, within which F_mod's breakout may have either sign
 
 
 @dataclass(frozen=True)
-class Beside:
+class FlightErrors:
     """The errors of an exported flight against coupled's own, at the worst frame and control.
 
     `deflection` and `estimate` are shares of the travel, `force` and `modifying_force` of the
@@ -117,7 +117,7 @@ def alone_record(manoeuvre: Manoeuvre, record: Record, table: Floats) -> Record:
     return Record(record.channels, data, dict(record.manifest))
 
 
-def beside(manoeuvre: Manoeuvre, configuration: str, ours: Record, alone: Record) -> Beside:
+def compare(manoeuvre: Manoeuvre, configuration: str, ours: Record, alone: Record) -> FlightErrors:
     """Compare a flight by JSBSim alone with coupled's own."""
     rig, rows = manoeuvre.rig, min(len(ours), len(alone))
     worst = dict.fromkeys(("deflection", "estimate", "force", "modifying_force", "surface"), 0.0)
@@ -134,7 +134,7 @@ def beside(manoeuvre: Manoeuvre, configuration: str, ours: Record, alone: Record
     flown = rig.flight is not None
     first, second = (judge(manoeuvre, configuration, record).loss for record in (ours, alone))
     loss = second - first
-    return Beside(
+    return FlightErrors(
         manoeuvre.name,
         manoeuvre.label,
         configuration,

@@ -1,4 +1,4 @@
-"""The loaders' services over a flight: set by its events before each frame, recorded after it."""
+"""The services of the loaders in a flight, set by its events and recorded at each frame."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Floats = NDArray[np.float64]
 _RESTING = [i for i, name in enumerate(SERVICE_CHANNELS) if name != "asked_{d}"]
 
 
-class Served:
+class FlightServices:
     """The services of a flight; false if it has none.
 
     `any_led`: the services of any control may be set from outside during the flight.
@@ -42,7 +42,7 @@ class Served:
         return bool(self._which)
 
     def around(self) -> tuple[Callable[[], None] | None, Callable[[int], None] | None]:
-        """Return the calls before and after a frame's host: events, and what is recorded."""
+        """Return the functions to call before and after a frame's host: events, and recording."""
         if not self:
             return None, None
 
@@ -62,13 +62,13 @@ class Served:
         return tuple(each for name in self._always for each in service_channels(name))
 
     def extend(self, frames: int) -> None:
-        """Let the flight have so many frames."""
+        """Extend the flight to a number of frames."""
         if self:
             more = np.zeros((frames - len(self._rows), *self._rows.shape[1:]))
             self._rows = np.concatenate((self._rows, more))
 
     def serve(self, control: ControlName, frames: int, asked: Floats) -> None:
-        """Record a control's services, of so many frames; `asked` are its first rows of δ̂, d."""
+        """Record the services of a control over `frames`; `asked` are its first rows of δ̂, d."""
         which = tuple(name for name in self._names if name in (*self._which, control))
         if which == self._which == self._always:
             return
