@@ -41,7 +41,7 @@ from coupled.gap.prepare import as_driven, in_own_trims, readers_of
 from coupled.gap.search.case import Case, Tell
 from coupled.gap.search.fit import fit_set
 from coupled.gap.search.found import Alike, Fit, alike
-from coupled.gap.signals.output import Output, Part
+from coupled.gap.signals.output import Output, Part, explained_below
 from coupled.gap.stages.airframe import airframe_outputs
 from coupled.gap.stages.tried import as_judged
 from coupled.gap.thresholds import (
@@ -76,6 +76,8 @@ USUAL_OF_LOADER = (
     *("regressor_force", "regressor_friction"),
 )
 USUAL_OF_LINKAGE = ("servo_frequency", "servo_damping_ratio", "bend", "play")
+# Parameters that imitate the yielding of dry friction as long as its contact is rigid.
+LIKE_CONTACT = ("loader.delay_s", "loader.play_m", "loader.play_rad")
 # Parameters whose value 0 means that the component is absent: a fit stays above 0.
 NONE_AT_ZERO = (
     *("servo_frequency", "servo_rate_limit", "servo_acceleration_limit", "bend_frequency"),
@@ -329,14 +331,14 @@ def fit_nominal(
             raise InputError(next(iter(records)), key, problem)
     shown_in = {output.stage for output in touched(outputs, effects)}
     fitter = _Fitter(rig, control, outputs, tell)
-    held, whole, fitted = fitter.fitted(effects)
+    held, whole, fitted, each = fitter.fitted(effects)
     numbers = dict(zip(chosen, fitted, strict=True))
     while loose := [numbers[e.name] for e in effects if numbers[e.name].width > 1.0]:
         # The least determined one stays as filed, and the others are fitted again.
         worst = max(loose, key=lambda number: number.width)
         numbers[worst.key] = worst.as_filed
         effects = [effect for effect in effects if effect.name != worst.key]
-        held, _, fitted = fitter.fitted(effects)
+        held, _, fitted, each = fitter.fitted(effects)
         numbers |= {one.key: one for one in fitted}
     together = [one for group in whole.groups.values() for one in alike(group)]
     found = tuple(numbers.values())
@@ -350,7 +352,10 @@ def fit_nominal(
         found,
         tuple(one for one in together if {*one.keys} <= {*chosen}),
         tuple(_channel(output, rig, held.rig, files[output.record]) for output in used),
-        _doubts_of_servo(known, control, determined, held.rig, used),
+        (
+            *_doubts_of_residual(rig, each, used),
+            *_doubts_of_servo(known, control, determined, held.rig, used),
+        ),
     )
 
 
@@ -363,8 +368,8 @@ class _Fitter:
     outputs: Sequence[Output]
     tell: Tell | None
 
-    def fitted(self, effects: Sequence[Effect]) -> tuple[Fit, Fit, list[Number]]:
-        """Return the fits to every other stretch and to all, and the parameters fitted to all.
+    def fitted(self, effects: Sequence[Effect]) -> tuple[Fit, Fit, list[Number], dict[int, Fit]]:
+        """Return fits to every other stretch and to all, their parameters, and each record's fit.
 
         The interval of a parameter is at least its scatter between the records, each fitted alone.
         """
@@ -374,12 +379,16 @@ class _Fitter:
         held = self._fit(effects, self.outputs, part="fitted")
         self._say("fitting to all", 1, tasks)
         whole = self._fit(effects, self.outputs, held.values)
-        each = list[Fit]()
-        for i, record in enumerate(records if len(records) > 1 else []):
+        if len(records) == 1:
+            numbers = [self._number(one, whole, ()) for one in effects]
+            return held, whole, numbers, {records[0]: whole}
+        each = dict[int, Fit]()
+        for i, record in enumerate(records):
             self._say(f"fitting to record {i + 1} alone", i + 2, tasks)
             ours = [output for output in self.outputs if output.record == record]
-            each.append(self._fit(effects, ours, whole.values))
-        return held, whole, [self._number(one, whole, each) for one in effects]
+            each[record] = self._fit(effects, ours, whole.values)
+        alone = list(each.values())
+        return held, whole, [self._number(one, whole, alone) for one in effects], each
 
     def _say(self, what: str, done: int, tasks: int) -> None:
         if self.tell is not None:
@@ -397,7 +406,8 @@ class _Fitter:
         A time stamp error of the force is within the tolerance of a recorder's clocks. Without it a
         lag of a fraction of a frame is fitted as friction. A free delay of the force stands for it.
         Dry friction yields before it slips, as in a diagnosis, if the residual is a step lower for
-        it. Without it the force after each reversal is fitted as mass.
+        it. Without it the force after each reversal is fitted as mass. The fit with it also starts
+        without the delay and play that the fit without it has in its place.
         """
         (number,) = CLOCK.free
         timed = {number.key, BY_NAME[LAG].free[0].key}
@@ -410,11 +420,20 @@ class _Fitter:
         if not yielding:
             return rigid
         beside += yielding
-        begun = case.with_contact(effects, beside, {**rigid.values, **(start or {})})
-        soft = fit_set(case, effects, beside, priors, begun, part=part)
-        ours = touched(outputs, yielding)
-        left, without = (_held_out_rms(ours, one.rig) for one in (soft, rigid))
-        return soft if left < (1.0 - LESSER) * without else rigid
+        ours, known = touched(outputs, yielding), {**rigid.values, **(start or {})}
+        absent = {
+            effect.value_key(p): 0.0
+            for effect in effects
+            for p in effect.free
+            if p.key_on(self.control) in LIKE_CONTACT and p.nominal(self.rig, self.control) == 0.0
+        }
+        each = list[tuple[float, Fit]]()
+        for values in [known, {**known, **absent}] if absent else [known]:
+            begun = case.with_contact(effects, beside, values)
+            soft = fit_set(case, effects, beside, priors, begun, part=part)
+            each.append((_held_out_rms(ours, soft.rig), soft))
+        left, soft = min(each, key=lambda one: one[0])
+        return soft if left < (1.0 - LESSER) * _held_out_rms(ours, rigid.rig) else rigid
 
     def _contact(self, effects: Sequence[Effect]) -> list[Effect]:
         """Return the presliding parameters that are not free, if the fitted rig has friction."""
@@ -440,6 +459,25 @@ class _Fitter:
         known = half if math.isfinite(half) else None
         bounds = parameter.low, parameter.accepted(self.rig, self.control)[1]
         return Number(effect.name, filed, found, known, *bounds, name in whole.at_bound)
+
+
+def _doubts_of_residual(
+    filed: Rig, each: Mapping[int, Fit], used: Sequence[Output]
+) -> tuple[str, ...]:
+    """Return doubts about channels whose residual exceeds noise in the fit to their record alone.
+
+    Differences between records are in the intervals, and no reason for doubt.
+    """
+    misses = dict[str, float]()
+    for output in used:
+        gap = output.gap(each[output.record].rig)
+        if gap > explained_below(output.gap(filed), output.limit):
+            misses[output.channel] = max(gap, misses.get(output.channel, 0.0))
+    return tuple(
+        f"the residual of {channel} is {gap:.3g} times its noise: the machine has an effect that the"
+        " fit lacks, which may bias these numbers. Diagnose the records with the fitted rig"
+        for channel, gap in misses.items()
+    )
 
 
 def _doubts_of_servo(

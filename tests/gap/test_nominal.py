@@ -19,11 +19,12 @@ from coupled.rig.rigfile import read_rig
 from coupled.rig.rigwrite import rig_text
 from tests.support.commands import coupled
 from tests.support.gaps import made, nominal_rig
-from tests.support.machines import plain_rig, recorded
+from tests.support.machines import duffing, plain_rig, recorded
 from tests.support.rigs import bench
 
 FOUNDERS = Path(__file__).parents[3] / "shared" / "real"
 RATE_Hz, MASS_kg, DAMPING, FRICTION_N = 100.0, 8.0, 30.0, 4.0
+FRICTION = "controls.column.loader.friction_N"
 SLIDE = "controls.column.schedule.total_gradient_N_per_m"
 
 
@@ -35,7 +36,7 @@ def slide() -> Rig:
     return bench({**guess, **lists, "controls.column.length_m": 2.0})
 
 
-def moved(speeds_m_per_s: list[float]) -> Record:
+def moved(speeds_m_per_s: list[float], dry_N: float = FRICTION_N) -> Record:
     """Return a record of a slide that goes to and fro, each way at one speed of a list."""
     rng = np.random.default_rng(2)
     speed = np.repeat([s * side for s in speeds_m_per_s for side in (1, -1)], round(RATE_Hz))
@@ -43,7 +44,7 @@ def moved(speeds_m_per_s: list[float]) -> Record:
     speed = np.convolve(np.concatenate((np.zeros(50), speed)), edge / edge.sum(), "same")
     place = (np.cumsum(speed) - 0.5 * speed) / RATE_Hz
     pull = MASS_kg * np.gradient(speed) * RATE_Hz + DAMPING * speed
-    pull += FRICTION_N * np.tanh(speed / 1e-3) + rng.normal(0.0, 0.02, len(speed))
+    pull += dry_N * np.tanh(speed / 1e-3) + rng.normal(0.0, 0.02, len(speed))
     place += rng.normal(0.0, 1e-6, len(place))
     time = np.arange(len(speed)) / RATE_Hz
     names = ("time_s", "column_force_N", "column_computed_m", "dynamic_pressure_Pa")
@@ -130,6 +131,54 @@ def test_friction_that_yields_before_it_slips_is_not_fitted_as_mass() -> None:
         assert number.width < 0.05
     assert fitted.channels[0].after < 1.1 * fitted.channels[0].floor
     assert fitted.rig.controls["column"].loader.friction_stiffness == 0.0  # as in a diagnosis
+
+
+def test_a_fit_that_lacks_what_the_machine_has_is_doubtful() -> None:
+    """The interval of the gradient excluded it beside a spring that hardens, without a word."""
+    rig = plain_rig(100.0, {"mass_kg": 0.8, "damping_N_s_per_m": 2.0}, 3000.0)
+    keys = [f"loader.{key}" for key in ("mass_kg", "damping_N_s_per_m", "basic_gradient_N_per_m")]
+    records = {"r": duffing()}
+    (doubt,) = fit_nominal(rig, records, keys).doubts
+    assert doubt.startswith("the residual of column_computed_m is ")
+    assert not fit_nominal(rig, records, [*keys, "loader.cubic_N_per_m3"]).doubts
+
+
+def test_what_differs_between_records_is_no_reason_for_doubt() -> None:
+    """Friction of 4 and of 5 N: the fit to both misses each, and its interval holds both."""
+    fitted = fit_nominal(
+        slide(), {str(dry_N): moved([0.05, 0.1, 0.2], dry_N) for dry_N in (4.0, 5.0)}, KEYS
+    )
+    assert max(one.after / one.floor for one in fitted.channels) > 3.0
+    assert not fitted.doubts
+
+
+def yielding(seconds: float = 20.0, steps: int = 20) -> Record:
+    """Return a record of an imposed motion against friction that yields by 0.3 mm before it slips."""
+    time = np.arange(round(seconds * RATE_Hz * steps)) / (RATE_Hz * steps)
+    place, speed, gained = (np.zeros_like(time) for _ in range(3))
+    for most, turn in ((0.06, 0.5), (0.03, 1.4), (0.01, 3.1), (0.004, 7.0)):
+        place += most * (1.0 - np.cos(turn * time))
+        speed += most * turn * np.sin(turn * time)
+        gained += most * turn**2 * np.cos(turn * time)
+    bent, bends = 0.0, np.empty_like(time)
+    for k, step in enumerate(np.diff(place, prepend=0.0).tolist()):
+        bent = min(max(bent + step, -3e-4), 3e-4)
+        bends[k] = bent
+    pull = MASS_kg * gained + DAMPING * speed + FRICTION_N * bends / 3e-4
+    read = np.column_stack((pull, place))[::steps]
+    read += (0.02, 2e-6) * np.random.default_rng(3).standard_normal(read.shape)
+    return recorded(RATE_Hz, force_N=read[:, 0], computed_m=read[:, 1])
+
+
+@pytest.mark.slow
+def test_friction_that_yields_is_not_fitted_as_play_and_delay() -> None:
+    """A rigid friction with both is a local minimum, from which the fit did not come back."""
+    rig = slide().changed({"controls.column.drive": "displacement", FRICTION: 0.0})
+    keys = (*KEYS, "loader.delay_s", "loader.play_m")
+    fitted = fit_nominal(rig, {"r": yielding()}, keys)
+    real = dict(zip(keys, (MASS_kg, DAMPING, FRICTION_N, 0.0, 0.0), strict=True))
+    assert found(fitted) == pytest.approx(real, rel=0.02, abs=2e-5)
+    assert fitted.channels[0].after < 1.1 * fitted.channels[0].floor
 
 
 def test_a_number_that_the_records_do_not_determine_stays_as_filed(tmp_path: Path) -> None:
