@@ -474,8 +474,8 @@ def _doubts_of_residual(
         if gap > explained_below(output.gap(filed), output.limit):
             misses[output.channel] = max(gap, misses.get(output.channel, 0.0))
     return tuple(
-        f"the residual of {channel} is {gap:.3g} times its noise: the machine has an effect that the"
-        " fit lacks, which may bias these numbers. Diagnose the records with the fitted rig"
+        f"the residual of {channel} is {gap:.3g} times its noise: the machine has an effect that"
+        " the fit lacks, which may bias these numbers. Diagnose the records with the fitted rig"
         for channel, gap in misses.items()
     )
 

@@ -153,7 +153,7 @@ def test_what_differs_between_records_is_no_reason_for_doubt() -> None:
 
 
 def yielding(seconds: float = 20.0, steps: int = 20) -> Record:
-    """Return a record of an imposed motion against friction that yields by 0.3 mm before it slips."""
+    """Return a record of an imposed motion against friction that yields by 0.3 mm."""
     time = np.arange(round(seconds * RATE_Hz * steps)) / (RATE_Hz * steps)
     place, speed, gained = (np.zeros_like(time) for _ in range(3))
     for most, turn in ((0.06, 0.5), (0.03, 1.4), (0.01, 3.1), (0.004, 7.0)):
