@@ -146,7 +146,7 @@ def _own_folder(flight: Flight, file: object) -> Path:
     except (OSError, ValueError):  # a name that no folder can have
         there = False
     if not there:
-        problem = f"{flight.folder!r} holds no {flight.main_file}"
+        problem = f"{flight.folder!r} contains no {flight.main_file}"
         raise InputError(file, "flight.model_folder", problem)
     return folder
 

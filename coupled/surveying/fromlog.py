@@ -26,6 +26,7 @@ from coupled.record.channels import ControlName, channel
 from coupled.record.importing.plausible import check_size
 from coupled.record.record import Record
 from coupled.record.samples import check_samples
+from coupled.rig.equations import felt_gradient
 
 Floats = NDArray[np.float64]
 _WINDOWS_s = (0.2, 0.8)  # short ones for mass and damping, long ones for the gradient
@@ -98,7 +99,7 @@ def numbers_from_log(record: Record, control: ControlName, file: object) -> LogN
         travel=travel,
         mass=values["mass"],
         damping=values["damping"],
-        gradient=values["gradient"] / (1.0 + bend * values["gradient"]),
+        gradient=felt_gradient(values["gradient"], bend),
         breakout_N=values["breakout_N"],
         friction_N=values["friction_N"],
         bend=bend,

@@ -38,6 +38,8 @@ from tests.support.twin import WITHOUT_TWIN
 
 RECORDS, SEED = 3, 3
 OF_COLUMNS = [version for version in KNOWN if read_deck(version).whole is None]
+# Effects of the airframe that are newer than the newest version of the trials.
+NEWER = {"pitching_moment", "lift_offset"}
 
 
 def quiet(label: str, done: int, total: int) -> None:
@@ -175,18 +177,21 @@ def test_a_deck_is_whole(version: int) -> None:
 
 
 def test_the_newest_decks_have_every_effect_of_the_library() -> None:
-    """A travel's stops, a servo that is not there and an imposed motion are in no deck."""
+    """A travel's stops, a missing servo and an imposed motion are in no deck.
+
+    Nor are effects that are newer than the newest version, which is frozen.
+    """
     whole = read_deck(DEFAULT).whole
     assert whole is not None
     known = {kind.name for kind in read_deck(max(OF_COLUMNS)).effects} | {*whole.airframe}
     every = set(BY_NAME) - (WITHOUT_TWIN - {one.name for one in AIRFRAMES})
-    assert every - known == {"travel", "no_servo"}
+    assert every - known == {"travel", "no_servo", *NEWER}
 
 
 def test_the_deck_of_whole_aircraft_has_three_sizes_of_each_effect_on_four_models() -> None:
     deck = read_deck(DEFAULT)
     assert deck.whole is not None and len(deck.rigs) == 4
-    assert {*deck.whole.airframe} == {one.name for one in AIRFRAMES}
+    assert {*deck.whole.airframe} == {one.name for one in AIRFRAMES} - NEWER
     for name, sizes in (*deck.whole.airframe.items(), *deck.whole.control.items()):
         parameter = BY_NAME[name].free[0]
         assert len(set(sizes)) == 3 and all(parameter.low < abs(s) < 1e3 for s in sizes), name

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from coupled.calibration.documentation import check_feel
-from coupled.gap.effects.airframe import AIRFRAME
+from coupled.gap.effects.airframe import AIRFRAME, MOTION_ZEROS
 from coupled.gap.effects.effect import apply
 from coupled.gap.effects.library import BY_NAME
 from coupled.rig.rig import Rig
@@ -66,7 +66,7 @@ FAULTS: dict[str, dict[str, float]] = {
 UNSEEN = {
     "pressure_lag": "q̄ is constant",
     "bob_weight": "the aircraft does not move",
-    **{one.name: "the aircraft does not move" for one in AIRFRAME},
+    **{one.name: "the aircraft does not move" for one in (*AIRFRAME, *MOTION_ZEROS)},
     "surface_lag": "sweeps are slow",
     "surface_rate_limit": "sweeps are slow",
     "transport_delay": "timing starts at 90 % of the displacement",

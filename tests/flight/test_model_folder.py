@@ -67,10 +67,12 @@ def test_rig_and_model_may_be_moved_together(folder: Path) -> None:
 def test_a_folder_without_the_model_is_named(folder: Path) -> None:
     text = (folder / "mine.toml").read_text()
     (folder / "mine.toml").write_text(text.replace('"models"', '"elsewhere"'))
-    with pytest.raises(InputError, match=r"mine.toml: flight.model_folder: 'elsewhere' holds no"):
+    with pytest.raises(
+        InputError, match=r"mine.toml: flight.model_folder: 'elsewhere' contains no"
+    ):
         read_rig(folder / "mine.toml")
     lost = load_rig("t37").changed({"flight.model_folder": "elsewhere"})
-    with pytest.raises(InputError, match=r"model_folder: 'elsewhere' holds no T37/T37.xml"):
+    with pytest.raises(InputError, match=r"model_folder: 'elsewhere' contains no T37/T37.xml"):
         fly_rig(lost, column=Step(force_N=5.0), duration_s=0.1)
 
 
@@ -79,7 +81,7 @@ def test_a_variant_of_another_file_name_flies_and_is_exported_alone(folder: Path
     own = folder / "models" / "MINE"
     (own / "MINE.xml").rename(own / "late.xml")
     file = folder / "mine.toml"
-    with pytest.raises(InputError, match=r"model_folder: 'models' holds no MINE/MINE.xml"):
+    with pytest.raises(InputError, match=r"model_folder: 'models' contains no MINE/MINE.xml"):
         read_rig(file)
     file.write_text(file.read_text().replace('"MINE"\n', '"MINE"\nmodel_file = "late"\n'))
     flown = {}

@@ -253,4 +253,4 @@ def test_slow_noise_of_a_sensor_is_named_as_what_it_may_be(tmp_path: Path) -> No
     found = findings(prepared, *search_sets(prepared.case, library))
     assert found.guilty == ("linkage",)
     assert "no function of the stage's signals" in found.summary
-    assert "slow noise of a sensor would leave the same" in found.summary
+    assert "slow noise of a sensor would look the same" in found.summary

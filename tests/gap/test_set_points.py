@@ -10,7 +10,7 @@ import pytest
 
 from coupled.gap.chain import STAGES
 from coupled.gap.diagnose import diagnose
-from coupled.gap.effects.airframe import AIRFRAME
+from coupled.gap.effects.airframe import AIRFRAME, MOTION_ZEROS
 from coupled.gap.effects.effect import Effect
 from coupled.gap.effects.library import BY_NAME, EFFECTS
 from coupled.gap.nominal import fit_nominal
@@ -94,7 +94,7 @@ def test_a_set_point_has_no_scale_and_no_limit_below_the_speed_that_was_reached(
     left = {effect.name for effect in EFFECTS} - {effect.name for effect in library}
     # Those that need channels which the record lacks, a regressor, or an axis that turns.
     of_channels = {"crosstalk", "gravity", *(effect.name for effect in AIRFRAME if effect.needs)}
-    of_channels |= {"regressor_force", "regressor_friction"}
+    of_channels |= {"regressor_force", "regressor_friction", *(one.name for one in MOTION_ZEROS)}
     of_imposed_motion = {"yielding_contact"}
     assert (
         left == {"deflection_scale", "scale_drift", "mains_hum"} | of_channels | of_imposed_motion
