@@ -42,6 +42,7 @@ from tests.support.rigs import bench
 
 CLP = "aero/coefficient/Clp"
 SIZES = {"center_of_gravity": 0.08, "mass": 1.1, "lift_slope": 0.9}
+SIZES |= {"pitching_moment": 0.01, "lift_offset": 0.05}
 
 
 @pytest.fixture(scope="module")

@@ -141,7 +141,7 @@ def test_the_summary_names_size_certainty_and_share(tmp_path: Path) -> None:
     said = found.summary
     assert "Coulomb friction, 0 → 2.0" in said
     assert f"Probability {STATED_MOST:.2f}." in said
-    assert "% of the gap on held-out data" in said
+    assert "On held-out data " in said and "% of the gap is closed" in said
 
 
 def test_the_table_of_a_folder_says_why_a_record_was_refused() -> None:
