@@ -76,7 +76,7 @@ USUAL_OF_LOADER = (
     *("regressor_force", "regressor_friction"),
 )
 USUAL_OF_LINKAGE = ("servo_frequency", "servo_damping_ratio", "bend", "play")
-# Parameters that imitate the yielding of dry friction as long as its contact is rigid.
+# Parameters that imitate presliding friction if the contact is fitted as rigid.
 LIKE_CONTACT = ("loader.delay_s", "loader.play_m", "loader.play_rad")
 # Parameters whose value 0 means that the component is absent: a fit stays above 0.
 NONE_AT_ZERO = (
@@ -406,8 +406,9 @@ class _Fitter:
         A time stamp error of the force is within the tolerance of a recorder's clocks. Without it a
         lag of a fraction of a frame is fitted as friction. A free delay of the force stands for it.
         Dry friction yields before it slips, as in a diagnosis, if the residual is a step lower for
-        it. Without it the force after each reversal is fitted as mass. The fit with it also starts
-        without the delay and play that the fit without it has in its place.
+        it. Without it the force after each reversal is fitted as mass. With a rigid contact, delay
+        and play are fitted in place of presliding, so the fit with presliding also starts without
+        delay and play.
         """
         (number,) = CLOCK.free
         timed = {number.key, BY_NAME[LAG].free[0].key}
@@ -475,7 +476,7 @@ def _doubts_of_residual(
             misses[output.channel] = max(gap, misses.get(output.channel, 0.0))
     return tuple(
         f"the residual of {channel} is {gap:.3g} times its noise: the machine has an effect that"
-        " the fit lacks, which may bias these numbers. Diagnose the records with the fitted rig"
+        " is not in the fit and may bias these numbers. Diagnose the records with the fitted rig"
         for channel, gap in misses.items()
     )
 

@@ -15,21 +15,14 @@ Floats = NDArray[np.float64]
 POOL = read_deck(1).rigs
 STEP_N = 20.0
 RATE_Hz = 120
-# Effects that no twin has: of a rotating joint, of an imposed motion, and of an aircraft moved by
-# all controls.
+# Effects that no twin has: of a rotating joint, of an imposed motion, of an aircraft moved by all
+# controls, and of its sensors.
 WITHOUT_TWIN = {
     *("gravity", "yielding_contact", "regressor_force", "regressor_friction"),
     *("aileron_effectiveness", "rudder_effectiveness", "roll_damping", "yaw_damping"),
     *("dihedral_effect", "directional_stability", "side_force_slope", "adverse_yaw", "drag"),
     *("thrust", "roll_inertia", "pitch_inertia", "yaw_inertia", "center_of_gravity"),
-    *(
-        "lateral_gust",
-        "pitching_moment",
-        "lift_offset",
-        "elevator_zero",
-        "alpha_zero",
-        "sideslip_zero",
-    ),
+    *("lateral_gust", "pitching_moment", "lift_offset"),
     *("elevator_zero", "alpha_zero", "sideslip_zero", "pitch_zero", "load_factor_zero"),
     *("pitch_rate_zero", "roll_rate_zero", "yaw_rate_zero"),
 }

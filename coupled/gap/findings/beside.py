@@ -1,11 +1,11 @@
 """Effects fitted again beside the closed form of a curve.
 
-An effect that was fitted before a curve has part of the curve's residual in its size: damping by
-the square of the speed makes viscous damping too large. The curve cannot correct this, since it
-contains a straight line, whose slope is the effect's size. Its closed form does not. If a curve has
-one, the effects found compete again, with the closed form in the nominal rig: their sizes and
-probabilities are those beside the curve. An effect that the search then leaves out only
-approximated the curve.
+If an effect is fitted before a curve, its size includes part of the residual that the curve
+describes: beside damping by the square of the speed, viscous damping is too large. The curve cannot
+correct the size, since it contains a straight line, whose slope is the size. The closed form of the
+curve contains no straight line. The effects found are therefore searched again with the closed form
+in the nominal rig. Their sizes and probabilities are those of this search. An effect that the
+search does not select was an approximation of the curve.
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ def _without_curve(case: Case, before: Fit, beside: Fit) -> Fit:
 
 
 def _explains_as_much(case: Case, choice: Choice, rig: Rig, curved: Rig) -> bool:
-    """Tell whether a rig leaves about as little of each output as the rig with the curve."""
+    """Tell whether each residual with a rig is about as small as that with the curve."""
     root = choice.without_effects.rig
     return all(
         output.gap(rig)
