@@ -13,6 +13,7 @@ from functools import partial
 from typing import Any, Literal, NamedTuple
 
 from coupled.errors import InputError
+from coupled.gap.chain import AIRFRAME
 from coupled.gap.chain import BY_NAME as STAGE_OF
 from coupled.gap.signals.output import Floats, Output
 from coupled.gap.thresholds import LIGHT_LOAD_N, MODEL_ERROR
@@ -256,6 +257,11 @@ class Effect:
     def shows_in(self) -> tuple[str, ...]:
         """The outputs in which it shows."""
         return self.outputs or STAGE_OF[self.stage].effects_show_in
+
+    @property
+    def flies(self) -> bool:
+        """Whether each of its sizes needs a flight of the aircraft."""
+        return AIRFRAME in self.shows_in and self.seen is None
 
     @property
     def gradual(self) -> bool:

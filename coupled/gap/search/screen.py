@@ -26,7 +26,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.gap.chain import BY_NAME as STAGE_OF
 from coupled.gap.effects.effect import Effect, touched
 from coupled.gap.search.evidence import misfit
 from coupled.gap.search.found import Fit
@@ -222,8 +221,7 @@ class Screen:
             gain = max(gain, gain_to(now - share * change))
             left = float((now + change) @ (now + change))
             # A slope's start has a usual size; the projection gives its sign, or a smaller size.
-            by_slope = STAGE_OF[effect.stage].flown and effect.seen is None
-            times = min(max(-share, -1.0), 1.0) if by_slope else 1.0
+            times = min(max(-share, -1.0), 1.0) if effect.flies else 1.0
             if shape not in starts or left < starts[shape][0]:
                 starts[shape] = left, _times(self.problem, effect, values, times)
         found = [values for _, values in starts.values()]
@@ -232,11 +230,10 @@ class Screen:
     def _signatures(self, current: Fit, effect: Effect) -> list[_Signature]:
         """Return an effect's signatures with the current effects.
 
-        That of an effect of the airframe is its slope, from a small step: between trims further
+        That of an effect that needs flights is its slope, from a small step: between trims further
         apart, what the trim has left of the accelerations jumps.
         """
-        flown = STAGE_OF[effect.stage].flown
-        part = SMALL if flown and effect.seen is None else 1.0
+        part = SMALL if effect.flies else 1.0
         return [
             one
             for shape, tries in enumerate(_tries(self.problem, current, effect))
@@ -264,7 +261,7 @@ class Screen:
         in a size, its gain is predicted well only near the size of least residual. Single limits
         have sizes of their own.
         """
-        some = [e for e in effects if not (STAGE_OF[e.stage].flown or e.seen or is_limit(e))]
+        some = [e for e in effects if not (e.flies or e.seen or is_limit(e))]
         in_threads(lambda effect: self._refine_one(current, effect, False), some)
         each = [(self._taken(current, effect), effect) for effect in effects]
         least = SCREEN_NEAR * max((taken for taken, _ in each), default=0.0)
@@ -333,7 +330,7 @@ def _times(problem: Problem, effect: Effect, values: Values, times: float) -> Va
 
 def _tries(problem: Problem, current: Fit, effect: Effect) -> list[list[Values]]:
     """Return values of an effect's parameters to try, by shape; each shape may give a start."""
-    if is_limit(effect) and not STAGE_OF[effect.stage].flown:
+    if is_limit(effect) and not effect.flies:
         key = effect.value_key(effect.free[0])
         now = _residual(problem, effect, current.rig)
 
@@ -360,18 +357,17 @@ def _tries(problem: Problem, current: Fit, effect: Effect) -> list[list[Values]]
 
 def _sizes(problem: Problem, current: Fit, effect: Effect, shape: int) -> list[Values]:
     """Return values of an effect's parameters to try; a single one if each needs a flight."""
-    flown = STAGE_OF[effect.stage].flown
     sizes = [(size, factor) for size, factor in zip(BEAM_SIZES, BEAM_FACTORS, strict=True)]
     if any(p.mode == "added" and p.is_size and p.low < 0.0 for p in effect.free):
         sizes += [(-size, factor) for size, factor in sizes]
     found = []
-    for size, away in sizes[: 1 if flown or not effect.free else None]:
+    for size, away in sizes[: 1 if effect.flies or not effect.free else None]:
         values = {}
         for p in effect.free:
             start = value = p.starts[min(shape, len(p.starts) - 1)]
-            if not flown and p.mode == "factor":
+            if not effect.flies and p.mode == "factor":
                 value = 1.0 + away * (start - 1.0)
-            elif not flown and p.is_size:
+            elif not effect.flies and p.is_size:
                 value = size * start
             value += p.base(current.rig, problem.case.control)
             values[effect.value_key(p)] = float(np.clip(value, p.low, p.high))

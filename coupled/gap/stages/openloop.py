@@ -17,6 +17,7 @@ are known. States that are not recorded stay those of the model.
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -235,21 +236,23 @@ def _motion(
     """
     each = [airframe.reader(PROPERTIES.get(name, name)) for name in channels]
     step, readers = airframe.step, [read or float for read in each]
-    motion: list[list[float]] = []
-    for k, commands in enumerate(asked.tolist()):
+    motion, columns = array("d"), asked.T.tolist()  # a list for each row costs a tenth of a flight
+    for k, commands in enumerate(zip(*columns, strict=True)):
         now = [read() for read in readers]
         if (state := restarts.get(k)) is not None:
             airframe.put(state)
             put = zip(channels, readers, strict=True)
             now = [state[n] / _SI.get(n, 1.0) if n in state else read() for n, read in put]
         if not abs(now[0]) <= LOST_MOTION:  # true for NaN too
-            motion += [motion[-1] if motion else now] * (len(asked) - len(motion))
+            motion.extend((motion[-len(now) :] or array("d", now)) * (len(asked) - k))
             break
-        motion.append(now)
+        motion.extend(now)
         for one in led:
-            commands[one.number] = one.to(commands[one.number])
-        step(tuple(commands))
-    return np.array(motion) * [_SI.get(name, 1.0) for name in channels]
+            wanted = one.to(commands[one.number])
+            commands = (*commands[: one.number], wanted, *commands[one.number + 1 :])
+        step(commands)
+    found = np.frombuffer(motion).reshape(len(asked), len(channels))
+    return found * [_SI.get(name, 1.0) for name in channels]
 
 
 @dataclass(frozen=True)
