@@ -161,6 +161,7 @@ def test_a_report_is_one_html_file(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_a_share_that_rounds_to_zero_has_no_sign() -> None:
     assert percent(-1e-9) == "0.0 %"
     assert percent(-0.0012) == "-0.1 %"

@@ -77,6 +77,7 @@ def project(folder: Path, most: float, settings: str = "") -> None:
     (folder / "test_own.py").write_text(OWN)
 
 
+@pytest.mark.slow
 def test_what_fails_shows_figure_bounds_margin_time_and_why(tmp_path: Path) -> None:
     project(tmp_path, 50.0)
     done = run_pytest(tmp_path, "runs", "--coupled-report", "failed.html")

@@ -157,6 +157,7 @@ def by_quadrature() -> tuple[Floats, Floats]:
     return np.array([of_bend, of_slope]), np.array([1.0 - of_slope, 1.0 - of_bend])
 
 
+@pytest.mark.slow
 def test_flown_losses_have_the_indices_of_their_closed_form(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

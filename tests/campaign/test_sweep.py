@@ -195,6 +195,7 @@ def test_an_interrupted_sweep_says_that_it_goes_on(folder: Path) -> None:
     assert {row["ended_early"] for row in kept} == {""}
 
 
+@pytest.mark.slow
 def test_a_flight_that_ends_early_or_cannot_be_flown_is_a_row(folder: Path) -> None:
     text = """
 name = "s"

@@ -193,6 +193,7 @@ def test_a_servo_that_is_there_is_not_doubted() -> None:
     assert fitted.doubts == ()
 
 
+@pytest.mark.slow
 def test_without_a_servo_none_is_fitted_by_default() -> None:
     fitted = fit_nominal(bench_rig(), {"r": lacking(measured_bench("well.csv"), COMPUTED)})
     keys = {number.key for number in fitted.numbers}

@@ -105,6 +105,7 @@ def test_a_trim_that_is_the_rig_files_own_is_not_talked_of(filed: Rig) -> None:
     assert api.diagnose(filed, bare(own)).trim == api.diagnose(filed, own).trim == ""
 
 
+@pytest.mark.slow
 def test_a_fault_in_the_manifests_rig_is_found_against_the_rig_file(slow_737: Record) -> None:
     """The manifest's trim is taken, and nothing else of its rig."""
     worn = replace(

@@ -64,6 +64,7 @@ def numbers(folder: Path, made: Export, names: list[str]) -> np.ndarray[Any, np.
     return np.asarray(table[0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("rig", "model"), [("t37", "T37"), ("c172p", "c172p")])
 def test_an_aircraft_started_by_jsbsim_alone_has_the_rigs_load(
     tmp_path: Path, rig: str, model: str
@@ -103,6 +104,7 @@ def test_a_loaded_aircraft_flies_as_in_our_own_flight_and_its_script_sets_no_loa
     assert abs(first[2] - first[0]) > 1e-3
 
 
+@pytest.mark.slow
 def test_a_case_of_another_load_gets_it_by_its_script() -> None:
     """Exported loaded, and flown by a run whose case has the load of the model."""
     loaded = shipped("t37", {"flight.cg_aft_m": AFT_m, "flight.fuel": FUEL})
@@ -191,6 +193,7 @@ def test_only_the_numbers_of_a_model_are_changed(own: Path) -> None:
     assert found.decode() == wanted
 
 
+@pytest.mark.slow
 def test_a_location_in_metres_is_moved_in_metres(own: Path, tmp_path: Path) -> None:
     changed(own, 'name="AERORP" unit="IN"', 'name="AERORP" unit="M"')
     made = loaded_by(own, cg_aft_m=AFT_m)
@@ -198,6 +201,7 @@ def test_a_location_in_metres_is_moved_in_metres(own: Path, tmp_path: Path) -> N
     assert found == pytest.approx(-AFT_m / INCH_m, rel=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("old", "new", "keys", "says"),
     [

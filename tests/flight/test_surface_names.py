@@ -158,6 +158,7 @@ READS = """
 """
 
 
+@pytest.mark.slow
 def test_properties_of_flightgear_are_listed_and_made_from_the_rig(tmp_path: Path) -> None:
     rig = t37(flight__model_folder=str(own_t37(tmp_path, lambda t: within_controls(t, READS, ""))))
     names = "/controls/flight/spoilers, systems/electrical/volts; give each a value in fl"

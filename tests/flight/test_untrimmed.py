@@ -78,6 +78,7 @@ def test_a_speed_below_the_stall_is_explained_and_others_are_given(trim: str) ->
         make_aircraft(there, 1.0 / rig.frame_rate)
 
 
+@pytest.mark.slow
 def test_a_height_without_any_speed_is_said_to_have_none() -> None:
     high = read_rig(shipped_rigs()["t37"]).changed({"flight.altitude_m": 25000.0})
     with pytest.raises(InputError, match="nor does it at any other speed tried, 10 to 576 m/s"):

@@ -183,6 +183,7 @@ def test_the_lateral_motion_is_compared_if_aileron_and_rudder_are_recorded(healt
     }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "other"),
     [("rudder_rad", ""), ("yaw_rate_rad_per_s", ""), ("alpha_rad", "sideslip_rad")],

@@ -244,6 +244,7 @@ def test_a_summary_names_the_part_of_each_gap() -> None:
     assert said.endswith("Correct elevator effectiveness first.")
 
 
+@pytest.mark.slow
 def test_to_polars_has_the_control_of_each_effect() -> None:
     frame = whole(*WORN.items()).to_polars()
     assert dict(zip(frame["effect"], frame["control"], strict=True)) == {

@@ -92,6 +92,7 @@ def test_damping_by_the_square_of_the_speed_is_a_curve_over_the_rate() -> None:
     assert np.all(np.array(curve.high) >= curve.values)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("fault", "bend", "key", "like"),
     [

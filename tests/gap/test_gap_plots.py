@@ -214,6 +214,7 @@ def drawn_x(figure: Figure) -> float:
     return float(np.nanmax(np.abs(np.asarray(figure.axes[0].lines[0].get_xdata(), float))))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("effect", "surface"),
     [("roll_damping", "aileron"), ("yaw_damping", "rudder")],
@@ -233,6 +234,7 @@ def test_motion_is_drawn_beside_the_surface_that_turns_it(
     assert np.corrcoef(drawn[6:-6], motion[12:] - motion[:-12])[0, 1] > 0.3
 
 
+@pytest.mark.slow
 def test_restarts_of_a_replay_do_not_set_the_scale_of_a_signature() -> None:
     """A machine without a spring is replayed between restarts, where its speed jumps."""
     found = diagnose(slider_rig(), {"r": slider(1, 0.6)})

@@ -192,6 +192,7 @@ def test_a_damper_without_mass_and_spring_is_as_well_a_gauge_that_is_off() -> No
     assert fitted.numbers[0].found == pytest.approx(2000.0, rel=0.005)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("damping", [2000.0, 900.0])
 def test_a_fit_finds_the_play_of_a_damper_and_no_friction(damping: float) -> None:
     """Its joints delay the force by 0.1 to 0.2 ms, which is no friction."""

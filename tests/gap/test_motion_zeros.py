@@ -79,6 +79,7 @@ def healthy(tmp_path_factory: pytest.TempPathFactory) -> Record:
     return noisy(import_log(log)[0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", OFF)
 def test_a_zero_explains_the_offset_of_its_channel(healthy: Record, name: str) -> None:
     assert {*OFF} == {*ZEROS}

@@ -133,6 +133,7 @@ def test_friction_that_yields_before_it_slips_is_not_fitted_as_mass() -> None:
     assert fitted.rig.controls["column"].loader.friction_stiffness == 0.0  # as in a diagnosis
 
 
+@pytest.mark.slow
 def test_a_fit_that_lacks_what_the_machine_has_is_doubtful() -> None:
     """The interval of the gradient excluded it beside a spring that hardens, without a word."""
     rig = plain_rig(100.0, {"mass_kg": 0.8, "damping_N_s_per_m": 2.0}, 3000.0)

@@ -144,6 +144,7 @@ def filled(record: Record, lost: NDArray[np.bool_]) -> Record:
     return replace(record, data=data)
 
 
+@pytest.mark.slow
 def test_rows_that_a_recorder_filled_with_the_last_row_are_no_readings(tmp_path: Path) -> None:
     """Digital multiplier and viscous damping at 0.89 were the answer for a healthy machine."""
     rig = nominal_rig(False)

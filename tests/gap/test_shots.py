@@ -109,6 +109,7 @@ def test_drag_is_judged_by_speed_and_attitude(
     assert fit.values["drag.factor"] == pytest.approx(1.3, abs=0.05)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [*SLOW, "alpha_rad"])
 def test_a_record_without_a_state_says_what_is_not_judged(
     rig: Rig, healthy: Record, name: str
@@ -124,6 +125,7 @@ def test_a_record_without_a_state_says_what_is_not_judged(
     assert prepare(rig, {"r": record}, Part("column")).left_out == (said,)
 
 
+@pytest.mark.slow
 def test_a_throttle_that_moves_leaves_drag_and_thrust_unjudged(rig: Rig, healthy: Record) -> None:
     """The model's throttle stays as in trim; the rates hardly depend on it."""
     for moved, judged in ((0.0, set(SLOW)), (0.2, set())):
@@ -151,6 +153,7 @@ def test_late_stamps_of_the_motion_delay_its_restarts_too(rig: Rig, healthy: Rec
     assert all(output.gap(late) < output.limit for output in found.values())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("steps", [1, 2])
 def test_an_effect_changes_a_flight_of_wide_steps_nearly_as_one_of_its_own(
     rig: Rig, healthy: Record, steps: int

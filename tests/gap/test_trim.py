@@ -89,6 +89,7 @@ def test_the_error_of_a_trim_puts_no_barrier_before_the_right_model() -> None:
     assert squares == sorted(squares, reverse=True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("factor", "seed"), [(0.85, 3), (1.2, 4)])
 def test_the_right_aircraft_meets_the_motion_and_attitude_of_another_trim(
     tmp_path: Path, rig: Rig, factor: float, seed: int

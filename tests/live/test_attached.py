@@ -79,6 +79,7 @@ def wrong(time_s: float, now: Measured) -> Measured:
     return now._replace(deflection=now.deflection + 0.05) if 3.0 < time_s < 6.0 else now
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("fault", "after_s", "why"), [(stuck, 2.1, "gauge"), (wrong, 0.3, "δ")])
 def test_forces_fade_while_a_measurement_cannot_be_true(
     fault: Fault, after_s: float, why: str
@@ -118,6 +119,7 @@ def test_a_missing_sample_is_marked_and_does_not_change_the_estimate() -> None:
     assert found["bend"] == pytest.approx(COLUMN.loader.bend, rel=0.02)
 
 
+@pytest.mark.slow
 def test_a_silent_transducer_does_not_change_the_estimate() -> None:
     def silent(time_s: float, now: Measured) -> Measured:
         return now._replace(deflection=math.nan) if time_s > 4.0 else now

@@ -75,6 +75,7 @@ def test_a_ninth_viewer_is_refused(page: Any) -> None:
             pass
 
 
+@pytest.mark.slow
 def test_a_viewer_that_sends_too_many_requests_is_disconnected(page: Any) -> None:
     with connected(page) as viewer, pytest.raises(exceptions.ConnectionClosed):
         for _ in range(400):
@@ -91,6 +92,7 @@ def test_a_viewer_that_sends_too_many_requests_is_disconnected(page: Any) -> Non
     assert server.MOST_WORDS <= len(words) <= server.MOST_WORDS + 15
 
 
+@pytest.mark.slow
 def test_the_last_of_many_hand_positions_counts(page: Any) -> None:
     with connected(page) as viewer:
         for n in range(2000):

@@ -24,6 +24,7 @@ PROFILE = np.array([0.0, 20.0, 35.0, 50.0, 70.0, 110.0])
 UNBENT = {"controls.column.compensation.gradient": False}
 
 
+@pytest.mark.slow
 def test_external_control_gives_the_curves_force() -> None:
     """The force ordered, from δ̂ − δc = K·F, is the curve's at δ̂ once it is faded in."""
     curve = {"deflection_m": CYCLIC, "force_N": [CYCLIC_N], "dynamic_pressure_Pa": [0.0]}

@@ -54,6 +54,7 @@ def test_each_field_lies_where_the_layout_has_it() -> None:
     assert found["visibility"] == 20000.0
 
 
+@pytest.mark.slow
 def test_a_flight_is_seen_as_it_is_flown() -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as view:
         view.bind(("127.0.0.1", 0))

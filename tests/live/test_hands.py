@@ -95,6 +95,7 @@ class Looker:
         """Nothing is open."""
 
 
+@pytest.mark.slow
 def test_the_hand_follows_the_stick_with_the_force_that_the_loader_needs() -> None:
     manoeuvre = rig_live("report-column", 4.0)
     record = fly_live(manoeuvre, Plan(paced=False, hand_positions=Wanted())).record
@@ -129,6 +130,7 @@ def test_switches_marks_and_stop_act_at_their_frame() -> None:
     assert len(warned) == 2
 
 
+@pytest.mark.slow
 def test_a_service_set_live_is_recorded_as_the_event_of_a_run() -> None:
     """The record has the bytes of a batch flight, although the rig file gives no services."""
     led = [("trim_m", 0.5, 0.02), ("feel_lost", 1.0, 0.4), ("jammed", 1.5, 1.0)]

@@ -49,6 +49,7 @@ def correlated(count: int, memory: float, random: np.random.Generator) -> np.nda
     return np.asarray(lfilter([1.0], [1.0, -memory], white))
 
 
+@pytest.mark.slow
 def test_the_interval_has_its_coverage_with_correlated_noise() -> None:
     """The variance is (1 + ρ)/(1 − ρ) times that of white noise; without it 59 % would hold K."""
     memory, count, frames = 0.7, 100, 1800

@@ -116,6 +116,7 @@ def test_the_same_report_gives_the_same_bytes() -> None:
     assert render(report_of()) == render(report_of())
 
 
+@pytest.mark.slow
 @given(st.text(max_size=30))
 def test_no_name_acts_on_the_page(word: str) -> None:
     plain = Page(render(_words_only("x")))

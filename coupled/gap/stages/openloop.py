@@ -40,6 +40,7 @@ from coupled.record.channels import ControlName, motion_channels
 from coupled.record.record import Record
 from coupled.resources import aircraft_folder
 from coupled.rig.parameters import Flight
+from coupled.rig.placed import Commands
 from coupled.rig.recorder import stamped
 from coupled.schema import changed
 from coupled.units import FOOT_m
@@ -222,6 +223,13 @@ class _Led:
         return self.last
 
 
+def _reaching(commands: Commands, led: Sequence[_Led]) -> Commands:
+    """Return the commands in which those of surfaces that are led reach their positions."""
+    by_number = {one.number: one.to(commands[one.number]) for one in led}
+    column, wheel, pedals = (by_number.get(i, own) for i, own in enumerate(commands))
+    return column, wheel, pedals
+
+
 def _motion(
     airframe: JSBSimAirframe,
     asked: Floats,
@@ -247,10 +255,7 @@ def _motion(
             motion.extend((motion[-len(now) :] or array("d", now)) * (len(asked) - k))
             break
         motion.extend(now)
-        for one in led:
-            wanted = one.to(commands[one.number])
-            commands = (*commands[: one.number], wanted, *commands[one.number + 1 :])
-        step(commands)
+        step(_reaching(commands, led) if led else commands)
     found = np.frombuffer(motion).reshape(len(asked), len(channels))
     return found * [_SI.get(name, 1.0) for name in channels]
 

@@ -104,6 +104,7 @@ def test_where_noise_explains_every_stage_an_effect_is_named_if_none_is_far_behi
     assert bool(_choose(beam, ()).steps) is named
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("factor", "found"), [(1.015, []), (1.03, ["inertia"])])
 def test_the_tolerance_is_that_of_the_rig_file(
     tmp_path: Path, factor: float, found: list[str]

@@ -49,6 +49,7 @@ def write(
     return path
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", ["csv", "parquet"])
 def test_an_element_is_found_by_its_name_and_its_place_only_where_that_stays(
     tmp_path: Path, form: str
