@@ -97,6 +97,18 @@ def test_a_constant_moment_is_that_of_the_models_own_function(tmp_path: Path) ->
     assert max(gaps(alone(), record, {"pitching_moment": 0.02}).values()) < 1.2  # C_m0 is 0.1
 
 
+@pytest.mark.slow
+def test_an_aircraft_with_other_fuel_is_named_as_that(tmp_path: Path) -> None:
+    """Its mass, its centre of gravity and all its moments of inertia differ."""
+    log, _ = flown(tmp_path, {}, 20.0, fuel=0.4)
+    found = diagnose(alone(), {"log": noisy(import_log(log)[0])})
+    (effect,) = found.effects
+    (factor,) = effect.parameters
+    assert (found.verdict, effect.name) == ("effect", "fuel")
+    assert factor.low is not None and factor.high is not None
+    assert factor.low < 0.4 < factor.high < factor.low + 0.1
+
+
 def test_a_constant_lift_is_added_along_the_lift() -> None:
     """With C_L more the aircraft trims at less lift due to the angle of attack."""
     names = ("aero/alpha-rad", "aero/cl-squared")

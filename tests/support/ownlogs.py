@@ -88,11 +88,12 @@ def flown(
     controls: int = 3,
     heading_deg: float = 0.0,
     by_hand: bool = True,
+    fuel: float = 1.0,
 ) -> tuple[Path, Floats]:
     """Fly an edited copy of a model from trim in bare JSBSim, with its own CSV output.
 
     `factors` are on functions by the ends of their names, `controls` how many of elevator, aileron
-    and rudder move, `by_hand` or in jumps. Returns the CSV file, and the properties at each frame,
+    and rudder move, `by_hand` or in jumps, `fuel` in two tanks, of the model's. Returns the CSV file, and the properties at each frame,
     shape (frames, properties).
     """
     models = edited_model(folder / "edited", model, multiplied(factors))
@@ -105,6 +106,8 @@ def flown(
     fdm.set_dt(1.0 / RATE_Hz)
     fdm["ic/vc-kts"], fdm["ic/h-sl-ft"] = 52.0 / KNOT_m_per_s, 1200.0 / FOOT_m
     fdm["ic/psi-true-deg"] = heading_deg
+    for tank in (0, 1) if fuel != 1.0 else ():
+        fdm[f"propulsion/tank[{tank}]/contents-lbs"] *= fuel
     fdm["propulsion/set-running"] = -1
     fdm["fcs/mixture-cmd-norm"] = 1.0
     fdm.set_output_path(str(folder))

@@ -61,6 +61,7 @@ AIRFRAME: tuple[Effect, ...] = (
     _factor_on("drag", 1.1, "alpha", "load_answer", "loop", bounds=_POSITIVE),
     _factor_on("thrust", 1.1, "alpha", "load_answer", "loop", bounds=_POSITIVE),
     _factor_on("mass", 1.03, "alpha", "load_answer", "loop", bounds=(0.3, 3.0)),
+    _factor_on("fuel", 0.8, "alpha", "load_answer", "loop", bounds=(0.0, 10.0)),
     _factor_on("roll_inertia", 1.1, "aileron", "roll_rate", "loop", (_ROLL,), _POSITIVE),
     _factor_on("pitch_inertia", 1.1, "elevator", "pitch_rate", "loop", bounds=_POSITIVE),
     _factor_on("yaw_inertia", 1.1, "rudder", "yaw_rate", "loop", (_YAW,), _POSITIVE),
