@@ -93,8 +93,8 @@ def flown(
     """Fly an edited copy of a model from trim in bare JSBSim, with its own CSV output.
 
     `factors` are on functions by the ends of their names, `controls` how many of elevator, aileron
-    and rudder move, `by_hand` or in jumps, `fuel` in two tanks, of the model's. Returns the CSV file, and the properties at each frame,
-    shape (frames, properties).
+    and rudder move, `by_hand` or in jumps, `fuel` in two tanks, of the model's. Returns the CSV
+    file, and the properties at each frame, shape (frames, properties).
     """
     models = edited_model(folder / "edited", model, multiplied(factors))
     listed = "".join(f"<property>{name}</property>" for name in properties)
