@@ -5,6 +5,8 @@ An effect whose moment needs lateral motion is tried only with records that have
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from coupled.gap.effects.effect import TERMS, Drawing, Effect, Sampled, added, entry, factor, value
 from coupled.gap.signals.air import NEEDS, NEEDS_ACROSS, spread_of_air, spread_of_crossing_air
 from coupled.rig.recorder import ZEROS
@@ -61,7 +63,9 @@ AIRFRAME: tuple[Effect, ...] = (
     _factor_on("drag", 1.1, "alpha", "load_answer", "loop", bounds=_POSITIVE),
     _factor_on("thrust", 1.1, "alpha", "load_answer", "loop", bounds=_POSITIVE),
     _factor_on("mass", 1.03, "alpha", "load_answer", "loop", bounds=(0.3, 3.0)),
-    _factor_on("fuel", 0.8, "alpha", "load_answer", "loop", bounds=(0.0, 10.0)),
+    replace(  # mass, centre of gravity along two axes, and three moments of inertia
+        _factor_on("fuel", 0.8, "alpha", "load_answer", "loop", bounds=(0.0, 10.0)), changes=6
+    ),
     _factor_on("roll_inertia", 1.1, "aileron", "roll_rate", "loop", (_ROLL,), _POSITIVE),
     _factor_on("pitch_inertia", 1.1, "elevator", "pitch_rate", "loop", bounds=_POSITIVE),
     _factor_on("yaw_inertia", 1.1, "rudder", "yaw_rate", "loop", (_YAW,), _POSITIVE),

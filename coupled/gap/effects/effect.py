@@ -232,6 +232,7 @@ class Effect:
     `seen`         returns start values by parameter, estimated from the residuals
     `of_sensor`    it acts in the sensor of δc, which a set point does not have
     `contains`     names of the laws nested in it
+    `changes`      how many quantities of the rig change with its parameter
     `of`           the aerodynamic function that it scales; empty for an effect of the library
     """
 
@@ -246,6 +247,7 @@ class Effect:
     seen: Callable[[Sequence[Output], Rig, ControlName], list[dict[str, float]]] | None = None
     of_sensor: bool = False
     contains: tuple[str, ...] = ()
+    changes: int = 1
     of: str = ""
 
     @property

@@ -104,8 +104,11 @@ def evidence_of(problem: Problem, rig: Rig, error: ModelError, rest: float) -> E
 
 
 def log_prior(effect: Effect) -> float:
-    """Return the log prior probability of an effect, relative to its absence."""
-    return -PRIOR_EFFECT - PRIOR_NUMBER * max(len(effect.free) - 1, 0)
+    """Return the log prior probability of an effect, relative to its absence.
+
+    An effect that changes several quantities of the rig is less likely than one of them alone.
+    """
+    return -PRIOR_EFFECT - PRIOR_NUMBER * (max(len(effect.free), effect.changes) - 1)
 
 
 def _laplace(problem: Problem, members: Sequence[Effect], group: Group) -> float:
