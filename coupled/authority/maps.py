@@ -27,7 +27,6 @@ from coupled.record.channels import ELEVATOR, LOAD, PRESSURE, ControlName, chann
 from coupled.record.record import Record
 from coupled.resources import aircraft_folder, shipped_runs
 from coupled.rig.equations import bend_loss, gradient_at_neutral
-from coupled.rig.loader import stop_of
 from coupled.rig.packing import COMMAND_SIGN
 from coupled.rig.rig import Rig
 from coupled.rig.statics import static_line, static_point
@@ -108,7 +107,7 @@ def _pulled(rig: Rig, control: ControlName, pressure_Pa: float) -> tuple[Floats,
     If the loader reaches its stop before the grip's travel, the structure bends on from there.
     """
     data = rig.controls[control]
-    stop = stop_of(data.pull, data.loader.stop_aft)
+    stop = data.stop_to(1.0)
     line = static_line(rig, control, pressure_Pa, stop * np.linspace(1e-6, 1.0, _STEPS))
     parts = [line]
     if line.deflection[-1] < data.pull:

@@ -22,6 +22,7 @@ from coupled.exporting.system import System
 from coupled.record.channels import CONTROL_NAMES, ControlName
 from coupled.rig.declaration import Given, Hand
 from coupled.rig.packing import crossed_bends
+from coupled.rig.parameters import Control
 from coupled.rig.rig import Rig
 from coupled.rig.sensing import SENSING
 
@@ -56,7 +57,7 @@ def clamp_gains(made: ControlExport, gradient: float) -> tuple[float, float, flo
 def _add_inputs(made: ControlExport) -> None:
     """Add the inputs: a force, or a position that a hand holds; and the switches."""
     system, d, host = made.system, made.d, made.control.compensation
-    travel, own = made.control.travel, made.own
+    data, own = made.control, made.own
     given = system.declare("force-N", 0.0, "the pilot's force on the grip, N")
     system.declare("hand", 0.0, "1: a hand holds the grip at hand-deflection plus axis")
     place = f"hand-deflection-{d}"
@@ -94,7 +95,7 @@ def _add_inputs(made: ControlExport) -> None:
     )
     led: tuple[tuple[str, Expr], ...] = (
         ("force-given-N", given),
-        ("hand/target", wanted + travel * own("axis-norm")),
+        ("hand/target", wanted + _axis_position(data, own("axis-norm"))),
     )
     for name, asked in led:
         before = system.add(f"{name}-before", made.kept(name))
@@ -108,6 +109,14 @@ def _add_inputs(made: ControlExport) -> None:
         ("integral", f"N_per_{d}_s"),
     ):
         system.add(f"hand/{gain}-now", own("hand") * own(f"hand-{gain}-{unit}"))
+
+
+def _axis_position(data: Control, axis: Expr) -> Expr:
+    """Return the position of the grip by a joystick's axis, d: ±1 is the travel of either side."""
+    if data.pull == data.push and data.stop_to(1.0) == data.stop_to(-1.0) == data.pull:
+        return data.pull * axis
+    pulled = within(data.pull * axis, 0.0, data.stop_to(1.0))
+    return pulled + within(data.push * axis, -data.stop_to(-1.0), 0.0)
 
 
 def _add_motion(made: ControlExport) -> None:

@@ -32,7 +32,6 @@ from coupled.exporting.expression import (
     size,
     within,
 )
-from coupled.rig.loader import stop_of
 
 
 @dataclass(frozen=True)
@@ -100,10 +99,7 @@ def add_loader(made: ControlExport, place: str, before: Expr, after: Expr, was: 
     if neutral is not None:
         reached = either(equal(halfway, neutral), 0.0, reached)
     control = made.control
-    aft, forward = (
-        stop_of(control.pull, loader.stop_aft),
-        stop_of(control.push, loader.stop_forward),
-    )
+    aft, forward = control.stop_to(1.0), control.stop_to(-1.0)
     out = f"{place}/computed"
     computed = system.add(out, within(reached, -forward, aft))
     rate = _rate(made, v, halfway)

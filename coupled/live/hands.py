@@ -13,6 +13,7 @@ from typing import Literal, Protocol
 from coupled.flight.pilot.base import Action, Pilot, Start
 from coupled.record.channels import ControlName
 from coupled.rig.packing import Hand
+from coupled.rig.parameters import Control
 from coupled.rig.rig import Rig
 
 BANDWIDTH_rad_per_s = 10.0  # of the hand that follows a stick
@@ -47,16 +48,17 @@ class LiveHand(Pilot):
 
 
 class PositionFilter:
-    """Filters the positions of one control's hand, within the travel in d."""
+    """Filters the positions of one control's hand, within the stops of both sides."""
 
-    def __init__(self, travel: float, frame_s: float) -> None:
-        self._travel = travel
+    def __init__(self, control: Control, frame_s: float) -> None:
+        self._control = control
         self._gain = -math.expm1(-frame_s / SMOOTH_s)
         self.at = 0.0
 
     def move(self, wanted: float) -> float:
-        """Return the hand's position after a frame, d; `wanted` is a share of the travel."""
+        """Return the hand's position after a frame, d; `wanted` is a share of a side's travel."""
         if math.isfinite(wanted):
-            place = self._travel * min(max(wanted, -1.0), 1.0)
+            asked = self._control.travel_to(wanted) * abs(wanted)
+            place = math.copysign(min(asked, self._control.stop_to(wanted)), wanted)
             self.at += self._gain * (place - self.at)
         return self.at

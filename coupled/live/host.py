@@ -117,7 +117,7 @@ class Host:
         self.switches = Switches(rig, access.controls, access.hands, self.real_loader)
         self.pacer = Pacer(self.frame_s, len(access.data))
         self.rows = Rows(len(access.data), plan.link is not None, plan.paced)
-        self._filters = [PositionFilter(control.travel, self.frame_s) for control in controls]
+        self._filters = [PositionFilter(control, self.frame_s) for control in controls]
         self._columns = [
             [access.channels.index(channel(name, q)) for q in ("force", "computed", "deflection")]
             for name in self.names

@@ -86,11 +86,6 @@ class LoaderState(SpringState, DelayState, Protocol):
     stop: int  # the stop reached during this frame: −1, 0 or +1
 
 
-def stop_of(travel: float, stop: float) -> float:
-    """Return a control's stop on one side, d: its `travel` there, or a `stop` within it."""
-    return min(travel, stop) if stop > 0.0 else travel
-
-
 LOADER = Declaration(
     layout(LoaderParameters, curve=SHAPE),
     section="control.loader",
@@ -99,8 +94,8 @@ LOADER = Declaration(
         "delay_substeps": lambda g: g.control.loader.delay / g.substep_s,
         "by_regressor": lambda g: g.control.loader.regressor_force,
         "travel": lambda g: g.control.travel,
-        "aft": lambda g: stop_of(g.control.pull, g.control.loader.stop_aft),
-        "forward": lambda g: stop_of(g.control.push, g.control.loader.stop_forward),
+        "aft": lambda g: g.control.stop_to(1.0),
+        "forward": lambda g: g.control.stop_to(-1.0),
     },
     state=layout(LoaderState, history=(DELAY_SLOTS,)),
     fixed=("external", "mass", "damping", "neutral"),

@@ -345,6 +345,11 @@ class SurfaceProperties(Section):
     position: list[str] = []
 
 
+def stop_of(travel: float, stop: float) -> float:
+    """Return a control's stop on one side, d: its `travel` there, or a `stop` within it."""
+    return min(travel, stop) if stop > 0.0 else travel
+
+
 class Control(Section):
     """One control of the rig."""
 
@@ -377,6 +382,15 @@ class Control(Section):
     def push(self) -> float:
         """Travel in the negative direction, d, as a size."""
         return self.travel_push or self.travel
+
+    def travel_to(self, side: float) -> float:
+        """Return the travel on a side, d: of a pull if `side` is positive, else of a push."""
+        return self.pull if side > 0.0 else self.push
+
+    def stop_to(self, side: float) -> float:
+        """Return the stop on a side, d: the end of the travel there, or a stop within it."""
+        stop = self.loader.stop_aft if side > 0.0 else self.loader.stop_forward
+        return stop_of(self.travel_to(side), stop)
 
     @property
     def properties(self) -> SurfaceProperties:

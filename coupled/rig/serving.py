@@ -135,8 +135,8 @@ def check_service(
     most = SERVICES[known[service]][2]
     if most is not None and not 0.0 <= to <= most:
         raise InputError(file, f"{place}.to", f"is {to:g}; a share or a switch, from 0 to 1")
-    if known[service].endswith("_{d}") and abs(to) > data.travel:
-        problem = f"is {to:g}, beyond the control's travel of ±{data.travel:g}"
+    if known[service].endswith("_{d}") and abs(to) > data.travel_to(to):
+        problem = f"is {to:g}, beyond the control's travel, {-data.push:g} to {data.pull:g}"
         raise InputError(file, f"{place}.to", problem)
 
 

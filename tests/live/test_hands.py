@@ -18,6 +18,7 @@ from coupled.live.hands import PositionFilter
 from coupled.live.host import Host, Plan, Request
 from coupled.live.session import fly_live
 from coupled.live.stick import Stick, axes_of
+from tests.support.rigs import bench
 
 
 class Device:
@@ -54,12 +55,17 @@ def test_a_missing_stick_is_refused() -> None:
         Stick(number=60)
 
 
-def test_a_follower_is_smooth_and_stays_within_the_travel() -> None:
-    follower = PositionFilter(0.1, 1.0 / 120.0)
+def test_a_follower_is_smooth_and_stays_within_the_stops_of_both_sides() -> None:
+    """A stick's full throw is the travel of its side; beyond a stop the hand would push forever."""
+    sides = {"travel_m": 0.1, "travel_push_m": 0.06, "loader.stop_forward_m": 0.04}
+    rig = bench().changed({f"controls.column.{key}": value for key, value in sides.items()})
+    follower = PositionFilter(rig.controls["column"], 1.0 / 120.0)
     way = [follower.move(5.0) for _ in range(120)]
     assert way[0] == pytest.approx(0.1 * -math.expm1(-1.0 / 120.0 / 0.04))
     assert max(way) == pytest.approx(0.1)
     assert follower.move(math.nan) == way[-1]
+    for share, place in ((-0.5, -0.03), (-1.0, -0.04), (0.5, 0.05), (0.0, 0.0)):
+        assert [follower.move(share) for _ in range(120)][-1] == pytest.approx(place)
 
 
 class Wanted:

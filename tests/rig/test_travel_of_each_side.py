@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
+import jsbsim
 import numpy as np
 import pytest
 
+import coupled
 from coupled.authority.compare import fly_and_judge
 from coupled.errors import InputError
 from coupled.exporting.write import Flown, export
 from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import Manoeuvre
-from coupled.flight.pilot import Doublet
+from coupled.flight.pilot import Clamp, Doublet
 from coupled.resources import shipped_rigs
 from coupled.rig.rig import Rig
 from coupled.rig.rigfile import read_rig
+from coupled.rig.serving import check_service
 from coupled.rig.surface import share_of_travel
 
 PULL_m, PUSH_m = 0.09, 0.06
@@ -54,6 +59,38 @@ def test_the_export_has_both_sides() -> None:
     assert found.surface < 0.01
 
 
+@pytest.mark.parametrize(("axis", "place"), [(1.0, -PUSH_m), (0.5, -0.03), (-0.5, 0.03)])
+def test_a_joystick_of_the_export_moves_the_grip_within_the_stops_of_its_side(
+    tmp_path: Path, axis: float, place: float
+) -> None:
+    """Full throw is the travel of a side. A grip held beyond a stop would take an endless force."""
+    rig = uneven().changed({"controls.column.travel_pull_m": 0.06})
+    coupled.export(rig, tmp_path / "made", runs=[], check=False)
+    fdm = jsbsim.FGFDMExec(str(tmp_path / "made"))
+    fdm.load_model("T37")
+    fdm["ic/h-sl-ft"], fdm["ic/vc-kts"] = 5000.0, 200.0
+    fdm.run_ic()
+    fdm["coupled/column/hand"] = 1.0
+    for _ in range(480):
+        fdm["fcs/elevator-cmd-norm"] = axis
+        fdm.run()
+    assert fdm["coupled/column/deflection-m"] == pytest.approx(place, abs=1e-3)
+    assert abs(fdm["coupled/column/force-held-N"]) < 150.0
+
+
 def test_a_side_beyond_the_travel_is_refused() -> None:
     with pytest.raises(InputError, match=r"travel_pull_m: is above travel_m = 0\.09"):
         uneven().changed({"controls.column.travel_pull_m": 0.1})
+
+
+def test_a_clamp_beyond_the_travel_of_its_side_is_refused() -> None:
+    """There the hand would push ever harder into the stop."""
+    Clamp(deflection_m=0.07).check(uneven(), "column", "run.toml")
+    with pytest.raises(InputError, match=r"beyond the control's travel, -0\.06 to 0\.09"):
+        Clamp(deflection_m=-0.07).check(uneven(), "column", "run.toml")
+
+
+def test_a_trim_beyond_the_travel_of_its_side_is_refused() -> None:
+    check_service(uneven(), "column", "trim_m", 0.07, "run.toml", "event.e")
+    with pytest.raises(InputError, match=r"beyond the control's travel, -0\.06 to 0\.09"):
+        check_service(uneven(), "column", "trim_m", -0.07, "run.toml", "event.e")

@@ -14,8 +14,7 @@ from coupled.rig.compiled import entry, stage
 from coupled.rig.control import STAGES
 from coupled.rig.declaration import first_order_gain
 from coupled.rig.friction import CONTACT_DAMPING
-from coupled.rig.loader import stop_of
-from coupled.rig.parameters import Compensation, Control
+from coupled.rig.parameters import Compensation, Control, stop_of
 from coupled.rig.surface import COMMAND_SIGN
 
 PRODUCT, GAIN, LARGER, STOP, LEAD, ANY, ROOT = range(7)

@@ -204,14 +204,14 @@ class Clamp(Pilot):
         return self.deflection_rad if unit_of(control) == "rad" else self.deflection_m
 
     def check(self, rig: Rig, control: ControlName, file: object) -> None:
-        """Refuse a deflection beyond the stops."""
+        """Refuse a deflection beyond the travel of its side."""
         super().check(rig, control, file)
         key = f"deflection_{unit_of(control)}"
         if key not in self.model_fields_set:
             raise InputError(file, f"pilot.{control}.{key}", "is missing")
-        held, travel = self.deflection(control), rig.controls[control].travel
-        if abs(held) > travel:
-            problem = f"{held:g} is beyond the control's travel of ±{travel:g}"
+        held, data = self.deflection(control), rig.controls[control]
+        if abs(held) > data.travel_to(held):
+            problem = f"{held:g} is beyond the control's travel, {-data.push:g} to {data.pull:g}"
             raise InputError(file, f"pilot.{control}.{key}", problem)
 
     def act(self, rig: Rig, control: ControlName, start: Start) -> Action:
