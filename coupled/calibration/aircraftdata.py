@@ -196,7 +196,7 @@ def _legs(
         if not on:
             legs.append(NOTHING)
             continue
-        _check(path, on, specified.travel)
+        _check(path, on, specified.travel_to(side))
         rubs = side * motion * specified.loader.friction
         legs.append(
             SweepLeg(
@@ -215,7 +215,7 @@ def _check(path: Path, rows: list[Row], travel: float) -> None:
     """Raise InputError for impossible rows; rows are of one leg, by absolute deflection."""
     for before, row in zip([None, *rows[:-1]], rows, strict=True):
         if abs(row.deflection) > BEYOND * travel:
-            problem = f"is at {row.deflection:.4g}, beyond the rig's travel of ±{travel:.4g}"
+            problem = f"is at {row.deflection:.4g}, beyond the rig's travel of {travel:.4g} there"
             raise InputError(path, f"row {row.number}", problem)
         if before is None:
             continue

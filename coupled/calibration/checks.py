@@ -94,13 +94,13 @@ class JudgedLeg:
 
 
 def judged(
-    travel: float, felt: Sequence[SweepLeg], specified: Sequence[SweepLeg]
+    data: Control, felt: Sequence[SweepLeg], specified: Sequence[SweepLeg]
 ) -> tuple[JudgedLeg, ...]:
     """Return the felt and the specified forces along each leg at the same δ."""
     found = []
-    grid = np.linspace(INNER, OUTER, 181) * travel
     for now, wanted, (side, _) in zip(felt, specified, LEGS.values(), strict=True):
-        at = grid
+        travel = data.travel_to(side)
+        at = np.linspace(INNER, OUTER, 181) * travel
         if wanted.read:
             at = np.abs(wanted.deflection)
             at = at[(at >= INNER * travel) & (at <= OUTER * travel)]
@@ -139,14 +139,15 @@ def static_checks(
     nodes = [abs(node) for node in data.schedule.deflection or () if node != 0.0]
     straight = min(nodes, default=data.schedule.break_deflection or data.travel)
     for now, wanted, leg in list(zip(felt, specified, LEGS, strict=True))[::2]:
-        near = np.abs(wanted.deflection) < LINE[1] * data.travel
+        travel = data.travel_to(LEGS[leg][0])
+        near = np.abs(wanted.deflection) < LINE[1] * travel
         if np.count_nonzero(near) < 2:
             continue  # too few readings for a line
-        forces = [breakout(each, data.travel, straight) for each in (now, wanted)]
+        forces = [breakout(each, travel, straight) for each in (now, wanted)]
         name = f"breakout, {leg.removeprefix('out, ')}"
         allowed = STATIC[control].breakout_N
         found.append(ControlCheck(name, pressure_Pa, forces[0], forces[1], allowed, "N"))
-    for at, leg in zip(judged(data.travel, felt, specified), LEGS, strict=True):
+    for at, leg in zip(judged(data, felt, specified), LEGS, strict=True):
         if not at.deflection.size:
             continue
         band = force_band(control, at.specified)
@@ -175,10 +176,10 @@ def surface_checks(
     allowed = SURFACE_rad[surface or data.surface] / DEGREE_rad
     degrees = surface_rad / DEGREE_rad
     for k, name in list(enumerate(LEGS))[::2]:
-        leg = felt[k]
-        inside = np.abs(leg.deflection) <= OUTER * data.travel
+        leg, travel = felt[k], data.travel_to(LEGS[name][0])
+        inside = np.abs(leg.deflection) <= OUTER * travel
         at, moved = np.abs(leg.deflection[inside]), np.abs(leg.surface[inside]) * degrees
-        asked = at / data.travel * degrees
+        asked = at / travel * degrees
         if read and read[k].read and np.isfinite(read[k].surface).any():
             there = np.isfinite(read[k].surface) & (np.abs(read[k].deflection) <= at[-1])
             if not there.any():

@@ -59,6 +59,8 @@ def _specified(data: Control) -> Control:
     return Control(
         surface=data.surface,
         travel=data.travel,
+        travel_pull=data.travel_pull,
+        travel_push=data.travel_push,
         length=data.length,
         loader=Loader(
             mass=loader.mass,
@@ -90,7 +92,7 @@ def specified_legs(rig: Rig, control: ControlName, pressure_Pa: float) -> tuple[
     share = np.linspace(1e-9, 1.0, POINTS)
     legs = []
     for side, motion in LEGS.values():
-        deflection = side * share * data.travel
+        deflection = side * share * data.travel_to(side)
         force = specified_force(rig, control, pressure_Pa, deflection)
         rubs = side * motion * data.loader.friction
         legs.append(SweepLeg(deflection, force + rubs, side * share))

@@ -54,7 +54,8 @@ def sweep(rig: Rig, control: ControlName, pressure_Pa: float) -> History:
     ends = np.arange(frames + 1) / rig.frame_rate
     quarter, half, last = 0.25 * SWEEP_s, 0.5 * SWEEP_s, SWEEP_s - TURN_s
     stops = [TURN_s, quarter, half - TURN_s, half + TURN_s, 3.0 * quarter, last]
-    path = np.interp(ends, stops, [0.0, BEYOND, 0.0, 0.0, -BEYOND, 0.0]) * data.travel
+    places = [0.0, BEYOND * data.pull, 0.0, 0.0, -BEYOND * data.push, 0.0]
+    path = np.interp(ends, stops, places)
     # At neutral the static line jumps by the breakout; the hand crosses the jump slowly.
     turns = [0.0, TURN_s, half - TURN_s, half + TURN_s, last, SWEEP_s]
     preload = np.interp(ends, turns, [0.0, 1.0, 1.0, -1.0, -1.0, 0.0])
@@ -77,7 +78,7 @@ def release(rig: Rig, control: ControlName, pressure_Pa: float, side: float) -> 
     `side` is +1 or −1. It is released from rest; its grip springs back by the bend at once.
     """
     rig = _finely_read(rig, control)
-    held = side * THROW * rig.controls[control].travel
+    held = side * THROW * rig.controls[control].travel_to(side)
     force = float(static_point(rig, control, pressure_Pa, held).force[0])
     frames = round((HELD_s + RELEASE_s) * rig.frame_rate)
     last = round(HELD_s * rig.frame_rate)

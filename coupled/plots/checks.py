@@ -53,11 +53,10 @@ def draw_static_checks(found: Documentation, system: System = "si") -> Figure:
         said = _verdict(found, condition.pressure_Pa, ("breakout", "force"), system)
         axes.set_title(said, fontsize=9)
         if found.surface_rad is not None:
-            ends = np.array([-1.0, 1.0])
-            degrees = found.surface_rad / DEGREE_rad * ends
+            degrees = found.surface_rad / DEGREE_rad * np.array([-1.0, 0.0, 1.0])
             below = grid[1, i]
             wide = SURFACE_rad[data.surface] / DEGREE_rad
-            x = factor * data.travel * ends
+            x = factor * np.array([-data.push, 0.0, data.pull])
             below.fill_between(x, degrees - wide, degrees + wide, color="0.85", linewidth=0)
             side = np.sign(np.dot(response.surface, response.deflection))
             moved = side * response.surface * found.surface_rad / DEGREE_rad

@@ -90,7 +90,7 @@ def draw_deflections(found: Documentation, system: System = "si") -> Figure:
     """Draw computed against true deflection, and the error of the host's estimate."""
     shown = deflection_shown(found.control, system)
     factor = shown.factor
-    travel = found.rig.controls[found.control].travel
+    control = found.rig.controls[found.control]
     figure, grid = panels(1, 2, 3.7)
     left, right = grid[0]
     for condition, color in zip(found.conditions, cycle((BLUE, ORANGE, GREEN)), strict=False):
@@ -101,7 +101,7 @@ def draw_deflections(found: Documentation, system: System = "si") -> Figure:
         )
         sweeps = ((condition.uncompensated, "solid", "δ̂ = δc"), (bent, "dashed", "δ̂ = δc + K̂·F"))
         for response, style, estimate in sweeps:
-            lacks = 100.0 * (response.deflection - response.estimate) / travel
+            lacks = 100.0 * (response.deflection - response.estimate) / control.travel
             right.plot(
                 factor * response.deflection,
                 lacks,
@@ -110,7 +110,7 @@ def draw_deflections(found: Documentation, system: System = "si") -> Figure:
                 linewidth=1.3,
                 label=f"{estimate}, {name}",
             )
-    ends = np.array([-1.0, 1.0]) * factor * travel
+    ends = factor * np.array([-control.push, control.pull])
     left.plot(ends, ends, color=GRAY, linewidth=4.0, zorder=0, label="δc = δ")
     left.set_ylabel(shown.labelled("computed deflection δc"))
     right.set_ylabel("δ − δ̂, % of travel")

@@ -253,3 +253,21 @@ def test_a_specified_leg_is_the_schedules_line_with_friction_against_the_motion(
         assert leg.force == pytest.approx(G_STIFF * leg.deflection + motion * friction, abs=1e-5)
         assert leg.surface == pytest.approx(side * share, abs=1e-8)
         assert not leg.read
+
+
+def test_a_healthy_control_with_a_shorter_travel_on_one_side_passes_on_both() -> None:
+    """Each side is swept, released and judged over its own travel, at which the surface is full."""
+    pull, push, full_rad = 0.15, 0.06, 0.4
+    rig = bench({"controls.column.travel_m": pull, "controls.column.travel_push_m": push})
+    checks = [c for c in check_feel(rig, "column", full_rad) if c.pressure_Pa == 3000.0]
+    still = {c.name: c for c in checks if "force" in c.name or "surface" in c.name}
+    assert len(still) == 6
+    assert all(check.margin > 0.9 for check in still.values())
+    for name, most in (("negative", push), ("positive", pull)):
+        line = G_STIFF * 0.93 * most
+        assert abs(still[f"force, out, {name}"].reference) <= line + 1e-6
+        assert abs(still[f"surface, {name}"].reference) <= 0.93 * math.degrees(full_rad) + 1e-6
+    for side, most in ((-1.0, push), (1.0, pull)):
+        assert release(rig, "column", 3000.0, side).start == pytest.approx(side * 0.4 * most)
+    legs = specified_legs(rig, "column", 3000.0)
+    assert [leg.deflection[-1] for leg in legs] == pytest.approx([pull, pull, -push, -push])

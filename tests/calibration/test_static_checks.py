@@ -87,7 +87,7 @@ def test_a_surface_may_be_off_by_two_degrees_and_a_spoiler_by_three(
 def test_forces_are_judged_from_3_to_93_percent_of_the_travel_where_they_are_worst() -> None:
     data = bench().controls["column"]
     wanted = four(lambda at: 10.0 + 1000.0 * at)
-    at = judged(data.travel, wanted, wanted)
+    at = judged(data, wanted, wanted)
     for leg, side in zip(at, (1.0, 1.0, -1.0, -1.0), strict=True):
         assert leg.deflection[[0, -1]] == pytest.approx(side * np.array([0.03, 0.93]) * TRAVEL)
         assert leg.felt == pytest.approx(side * (10.0 + 1000.0 * side * leg.deflection))
