@@ -207,8 +207,11 @@ class AttachedLoader:
                 self._warn(f"the measurements of the {name} are plausible again: the forces return")
 
     def measured_now(self, i: int) -> bool:
-        """Return whether the last call of `listen` received a new sample of control i, with δ."""
-        return self._fresh and self._measures[i]
+        """Return whether the last call of `listen` received a sample of control i with its δ.
+
+        δ that was not measured before the flight is not used, as it is not recorded.
+        """
+        return self._fresh and self._measures[i] and self.measures_deflection[i]
 
     def validity(self) -> int:
         """Return the validity of the frame's row (`coupled.record.channels`)."""
