@@ -94,10 +94,9 @@ WITHOUT_EFFECT: Mapping[type[Section], Mapping[str, str]] = {
         "loader_rate": "the export chooses the loader's rate itself",
         "noise": "noise of the record; the export's channels have none",
     },
-    Control: {
-        **{"tolerance": "how well the numbers are known; nothing in flight depends on it"},
-        **{"guesses": "the same"},
-    },
+    Control: dict.fromkeys(
+        ("tolerance", "guesses"), "how well the numbers are known; nothing in flight depends on it"
+    ),
     Gains: dict.fromkeys(
         ("mechanical_advantage", "s1_over_s2", "s3_over_s2", "low_gradient"),
         "a note of the bench; nothing in flight depends on it",
@@ -111,7 +110,9 @@ WITHOUT_EFFECT: Mapping[type[Section], Mapping[str, str]] = {
     ),
     Structure: {"reciprocal": "a check of the file"},
     Flight: {"landing": "JSBSim alone goes on after it meets the ground"},
-    Sensing: {"gauge_order": "nothing without a gauge", "gauge_damping_ratio": "the same"},
+    Sensing: dict.fromkeys(
+        ("gauge_order", "gauge_damping_ratio"), "without effect if there is no gauge"
+    ),
 }
 
 # Keys that are not exported, with the reason.

@@ -209,6 +209,9 @@ def test_what_is_left_out_is_said() -> None:
     noisy = bench({"noise": {"column_force_N": 0.1}})
     (left,) = check_keys(noisy, "rig")
     assert left.startswith("noise: ")
+    guessed = bench({"controls.column.guesses": ["loader.mass_kg"]})
+    (left,) = check_keys(guessed, "rig")
+    assert left.startswith("controls.column.guesses: how well the numbers are known")
 
 
 def joined_controls() -> Manoeuvre:
