@@ -97,7 +97,7 @@ def _case(
     """Return a case with the greatest force that can be flown, or None."""
     data = rig.controls[control]
     least = _LEAST * (data.loader.breakout + breakaway_force(data.loader))
-    travel = _SHARE * data.travel
+    travel = _SHARE * data.pull
     force = float(specified_force(rig, control, pressure_Pa, np.asarray(travel))) + breakaway_force(
         data.loader
     )

@@ -104,7 +104,7 @@ def stations(
 
 def _reach(rig: Rig, control: ControlName, pressure: float, strongest_N: float) -> float:
     """Return the largest deflection at which this force can hold a control, d."""
-    full = FULL_TRAVEL * rig.controls[control].travel
+    full = FULL_TRAVEL * rig.controls[control].pull
 
     def excess(deflection: float) -> float:
         return float(static_point(rig, control, pressure, deflection).force[0]) - strongest_N

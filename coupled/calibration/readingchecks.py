@@ -135,7 +135,8 @@ def _separating(control: Control, slope: float, strongest: float, d: str) -> str
     other = float(gradients[np.argmax(np.abs(gradients - slope))])
     if abs(other - slope) < 0.02 * abs(slope):
         return f"the rig's schedule has no other gradient than {slope:.4g} N/{d}: give it one"
-    held = min(0.95 * control.travel, strongest / other) if other > 0.0 else 0.95 * control.travel
+    far = 0.95 * control.pull
+    held = min(far, strongest / other) if other > 0.0 else far
     return (
         f"add a reading at {other:.4g} N/{d}, at {held:.3g} {d} ({held * other:.3g} N),"
         f" where these are at {slope:.4g} N/{d}"
