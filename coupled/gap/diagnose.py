@@ -247,8 +247,7 @@ def findings(prepared: Prepared, case: Case, choice: Choice) -> PartDiagnosis:
     unknown = unmeasured_trim(case.nominal, prepared.records) if AIRFRAME in faulty else ""
     change = None
     if baseline is not None:
-        named = list(prepared.records.values())
-        change = baseline.compared(named, prepared.case.outputs, part.own)
+        change = baseline.compared(prepared.records, prepared.case.outputs, part.own)
     if other := {one.name for one in effects if prepared.is_otherwise(one)}:
         effects = tuple(
             replace(one, probability=MOST * one.probability) if one.name in other else one

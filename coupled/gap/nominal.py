@@ -36,7 +36,7 @@ from coupled.gap.effects.effect import (
 )
 from coupled.gap.effects.library import BY_NAME, EFFECTS, LAG
 from coupled.gap.effects.linkage import SERVO
-from coupled.gap.effects.settings import CLOCK, Scales, contact, in_scale, is_dry
+from coupled.gap.effects.settings import CLOCK, Scales, in_scale, is_dry
 from coupled.gap.prepare import as_driven, in_own_trims, readers_of
 from coupled.gap.search.case import Case, Tell
 from coupled.gap.search.fit import fit_set
@@ -330,15 +330,15 @@ def fit_nominal(
             problem = f"nothing in these records depends on it; they lack {needs}"
             raise InputError(next(iter(records)), key, problem)
     shown_in = {output.stage for output in touched(outputs, effects)}
-    fitter = _Fitter(rig, control, outputs, tell)
-    held, whole, fitted, each = fitter.fitted(effects)
+    case = Case(rig, control, outputs, tell)
+    held, whole, fitted, each = _fitted(case, effects)
     numbers = dict(zip(chosen, fitted, strict=True))
     while loose := [numbers[e.name] for e in effects if numbers[e.name].width > 1.0]:
         # The least determined one stays as filed, and the others are fitted again.
         worst = max(loose, key=lambda number: number.width)
         numbers[worst.key] = worst.as_filed
         effects = [effect for effect in effects if effect.name != worst.key]
-        held, _, fitted, each = fitter.fitted(effects)
+        held, _, fitted, each = _fitted(case, effects)
         numbers |= {one.key: one for one in fitted}
     together = [one for group in whole.groups.values() for one in alike(group)]
     found = tuple(numbers.values())
@@ -359,107 +359,90 @@ def fit_nominal(
     )
 
 
-@dataclass(frozen=True)
-class _Fitter:
-    """Fits parameters of a rig to some outputs."""
+def _fitted(case: Case, effects: Sequence[Effect]) -> tuple[Fit, Fit, list[Number], dict[int, Fit]]:
+    """Return fits to every other stretch and to all, their parameters, and each record's fit.
 
-    rig: Rig
-    control: ControlName
-    outputs: Sequence[Output]
-    tell: Tell | None
+    The interval of a parameter is at least its scatter between the records, each fitted alone.
+    """
+    tell = case.tell or (lambda *_: None)
+    records = sorted({output.record for output in case.outputs})
+    tasks = len(records) + 2
+    tell("fitting", 0, tasks)
+    held = _fit(case, effects, part="fitted")
+    tell("fitting to all", 1, tasks)
+    whole = _fit(case, effects, held.values)
+    each = {records[0]: whole} if len(records) == 1 else dict[int, Fit]()
+    for i, record in enumerate(records if not each else ()):
+        tell(f"fitting to record {i + 1} alone", i + 2, tasks)
+        ours = [output for output in case.outputs if output.record == record]
+        each[record] = _fit(replace(case, outputs=ours), effects, whole.values)
+    alone = list(each.values()) if len(each) > 1 else []
+    return held, whole, [_number(case, one, whole, alone) for one in effects], each
 
-    def fitted(self, effects: Sequence[Effect]) -> tuple[Fit, Fit, list[Number], dict[int, Fit]]:
-        """Return fits to every other stretch and to all, their parameters, and each record's fit.
 
-        The interval of a parameter is at least its scatter between the records, each fitted alone.
-        """
-        records = sorted({output.record for output in self.outputs})
-        tasks = len(records) + 2
-        self._say("fitting", 0, tasks)
-        held = self._fit(effects, self.outputs, part="fitted")
-        self._say("fitting to all", 1, tasks)
-        whole = self._fit(effects, self.outputs, held.values)
-        if len(records) == 1:
-            numbers = [self._number(one, whole, ()) for one in effects]
-            return held, whole, numbers, {records[0]: whole}
-        each = dict[int, Fit]()
-        for i, record in enumerate(records):
-            self._say(f"fitting to record {i + 1} alone", i + 2, tasks)
-            ours = [output for output in self.outputs if output.record == record]
-            each[record] = self._fit(effects, ours, whole.values)
-        alone = list(each.values())
-        return held, whole, [self._number(one, whole, alone) for one in effects], each
+def _fit(
+    case: Case,
+    effects: Sequence[Effect],
+    start: Mapping[str, float] | None = None,
+    part: Part = "all",
+) -> Fit:
+    """Return effects fitted to a part of a case's outputs, beside nuisance parameters.
 
-    def _say(self, what: str, done: int, tasks: int) -> None:
-        if self.tell is not None:
-            self.tell(what, done, tasks)
+    The time stamp of the force may be off within the tolerance of a recorder's clocks, unless a
+    delay of the force is free; else a lag of a fraction of a frame would be fitted as friction. Dry
+    friction yields before it slips if that lowers the residual by a step; else the force after each
+    reversal would be fitted as mass. With a rigid contact, delay and play are fitted in place of
+    presliding, so the fit with presliding also starts without them.
+    """
+    (number,) = CLOCK.free
+    timed = {number.key, BY_NAME[LAG].free[0].key}
+    loader = any({*CLOCK.shows_in} & {*effect.shows_in} for effect in effects)
+    beside = [CLOCK] if loader and timed.isdisjoint(keys_of(effects)) else []
+    priors = {CLOCK.value_key(number): (0.0, number.high / NORMAL_95)}
+    rigid = fit_set(case, effects, beside, priors, start or {}, part=part)
+    yielding = _contact(case, effects) if loader else []
+    if not yielding:
+        return rigid
+    beside += yielding
+    ours, known = touched(case.outputs, yielding), {**rigid.values, **(start or {})}
+    absent = {
+        effect.value_key(p): 0.0
+        for effect in effects
+        for p in effect.free
+        if p.key_on(case.control) in LIKE_CONTACT and p.nominal(case.nominal, case.control) == 0.0
+    }
+    each = list[tuple[float, Fit]]()
+    for values in [known, {**known, **absent}] if absent else [known]:
+        begun = case.with_contact(effects, beside, values)
+        soft = fit_set(case, effects, beside, priors, begun, part=part)
+        each.append((_held_out_rms(ours, soft.rig), soft))
+    left, soft = min(each, key=lambda one: one[0])
+    return soft if left < (1.0 - LESSER) * _held_out_rms(ours, rigid.rig) else rigid
 
-    def _fit(
-        self,
-        effects: Sequence[Effect],
-        outputs: Sequence[Output],
-        start: Mapping[str, float] | None = None,
-        part: Part = "all",
-    ) -> Fit:
-        """Return effects fitted to a part of some outputs, beside nuisance parameters.
 
-        A time stamp error of the force is within the tolerance of a recorder's clocks. Without it a
-        lag of a fraction of a frame is fitted as friction. A free delay of the force stands for it.
-        Dry friction yields before it slips, as in a diagnosis, if the residual is a step lower for
-        it. Without it the force after each reversal is fitted as mass. With a rigid contact, delay
-        and play are fitted in place of presliding, so the fit with presliding also starts without
-        delay and play.
-        """
-        (number,) = CLOCK.free
-        timed = {number.key, BY_NAME[LAG].free[0].key}
-        loader = any({*CLOCK.shows_in} & {*effect.shows_in} for effect in effects)
-        beside = [CLOCK] if loader and timed.isdisjoint(keys_of(effects)) else []
-        priors = {CLOCK.value_key(number): (0.0, number.high / NORMAL_95)}
-        case = Case(self.rig, self.control, outputs)
-        rigid = fit_set(case, effects, beside, priors, start or {}, part=part)
-        yielding = self._contact(effects) if loader else []
-        if not yielding:
-            return rigid
-        beside += yielding
-        ours, known = touched(outputs, yielding), {**rigid.values, **(start or {})}
-        absent = {
-            effect.value_key(p): 0.0
-            for effect in effects
-            for p in effect.free
-            if p.key_on(self.control) in LIKE_CONTACT and p.nominal(self.rig, self.control) == 0.0
-        }
-        each = list[tuple[float, Fit]]()
-        for values in [known, {**known, **absent}] if absent else [known]:
-            begun = case.with_contact(effects, beside, values)
-            soft = fit_set(case, effects, beside, priors, begun, part=part)
-            each.append((_held_out_rms(ours, soft.rig), soft))
-        left, soft = min(each, key=lambda one: one[0])
-        return soft if left < (1.0 - LESSER) * _held_out_rms(ours, rigid.rig) else rigid
+def _contact(case: Case, effects: Sequence[Effect]) -> list[Effect]:
+    """Return the presliding parameters that are not free, if the fitted rig has friction."""
+    begun = {effect.value_key(p): p.starts[0] for effect in effects for p in effect.free}
+    rig = possible(case.nominal, case.control, effects, begun)
+    if rig is None or not is_dry(rig, case.control):
+        return []
+    free = {p.key_on(case.control) for effect in effects for p in effect.free}
+    return [one for one in case.contact if one.free[0].key_on(case.control) not in free]
 
-    def _contact(self, effects: Sequence[Effect]) -> list[Effect]:
-        """Return the presliding parameters that are not free, if the fitted rig has friction."""
-        begun = {effect.value_key(p): p.starts[0] for effect in effects for p in effect.free}
-        rig = possible(self.rig, self.control, effects, begun)
-        if rig is None or not is_dry(rig, self.control):
-            return []
-        free = {p.key_on(self.control) for effect in effects for p in effect.free}
-        given = contact(self.rig, self.control)
-        return [one for one in given if one.free[0].key_on(self.control) not in free]
 
-    def _number(self, effect: Effect, whole: Fit, each: Sequence[Fit]) -> Number:
-        """Return a parameter with the wider of its interval and its scatter between records."""
-        (parameter,) = effect.free
-        name = effect.value_key(parameter)
-        found, half = whole.values[name], 0.5 * (whole.high[name] - whole.low[name])
-        if each:
-            scatter = float(np.std([one.values[name] for one in each], ddof=1))
-            half = max(half, 2.0 * scatter)
-        if abs(found - parameter.low) < 1e-6 * parameter.starts[0]:
-            found = parameter.low  # a fit at its bound stays slightly inside
-        filed = float(parameter.nominal(self.rig, self.control))
-        known = half if math.isfinite(half) else None
-        bounds = parameter.low, parameter.accepted(self.rig, self.control)[1]
-        return Number(effect.name, filed, found, known, *bounds, name in whole.at_bound)
+def _number(case: Case, effect: Effect, whole: Fit, each: Sequence[Fit]) -> Number:
+    """Return a parameter with the wider of its interval and its scatter between records."""
+    (parameter,) = effect.free
+    name = effect.value_key(parameter)
+    found, half = whole.values[name], 0.5 * (whole.high[name] - whole.low[name])
+    if each:
+        half = max(half, 2.0 * float(np.std([one.values[name] for one in each], ddof=1)))
+    if abs(found - parameter.low) < 1e-6 * parameter.starts[0]:
+        found = parameter.low  # a fit at its bound stays slightly inside
+    filed = float(parameter.nominal(case.nominal, case.control))
+    known = half if math.isfinite(half) else None
+    bounds = parameter.low, parameter.accepted(case.nominal, case.control)[1]
+    return Number(effect.name, filed, found, known, *bounds, name in whole.at_bound)
 
 
 def _doubts_of_residual(

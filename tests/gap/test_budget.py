@@ -181,12 +181,12 @@ def test_a_rig_that_flies_further_from_the_record_is_not_offered() -> None:
 def test_an_effect_that_removes_what_a_free_model_cannot_is_credible() -> None:
     """If functions of the signals remove the same, the effect is doubtful by what remains."""
     same = (Regime("time_s", 1.0, 1.0, 0.01, 0.01, 20),)
-    assert Credibility("bend", same, 0.99, 1.0).value > 0.85
-    assert Credibility("imitation", same, 0.5, 1.0).value < 0.05
-    assert Credibility("imitation", same, 0.5, 0.1).value > 0.85
-    assert Credibility("between", same, 0.75, 1.0).value == pytest.approx(0.5, abs=0.01)
+    assert Credibility(same, 0.99, 1.0).value > 0.85
+    assert Credibility(same, 0.5, 1.0).value < 0.05
+    assert Credibility(same, 0.5, 0.1).value > 0.85
+    assert Credibility(same, 0.75, 1.0).value == pytest.approx(0.5, abs=0.01)
     drifts = (Regime("time_s", 0.5, 1.5, 0.01, 0.01, 20),)
-    assert Credibility("drifts", drifts, 0.99, 1.0).value < 0.05
+    assert Credibility(drifts, 0.99, 1.0).value < 0.05
 
 
 def test_a_models_own_error_may_be_alike_in_all_of_a_half() -> None:

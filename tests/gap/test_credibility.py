@@ -45,7 +45,7 @@ BOUND = 1.2
 def drifting(by: float, beside: float | None = None, remains: float = 0.0) -> Credibility:
     """Return the credibility of an effect whose halves surely differ by so much."""
     halves = Regime("time_s", 1.0 - 0.5 * by, 1.0 + 0.5 * by, 0.0, 0.0, 12)
-    return Credibility("bend", (halves,), beside, remainder=remains)
+    return Credibility((halves,), beside, remainder=remains)
 
 
 def test_a_remainder_begins_at_the_floor_and_is_even_at_the_bound() -> None:
@@ -293,12 +293,10 @@ def test_what_remains_of_an_exact_stage_is_held_against_an_effect(
     remains: float, value: float
 ) -> None:
     """A lag took 80 % of a hysteresis at rates that hardly change, and does not drift."""
-    assert Credibility("pressure_lag", (), remainder=remains, exact=True).value == pytest.approx(
-        value
-    )
-    flown = Credibility("pitch_damping", (), remainder=remains, in_full=True)
+    assert Credibility((), remainder=remains, exact=True).value == pytest.approx(value)
+    flown = Credibility((), remainder=remains, in_full=True)
     assert flown.value == pytest.approx(value)
-    assert Credibility("coulomb_friction", (), remainder=remains).value == 1.0
+    assert Credibility((), remainder=remains).value == 1.0
 
 
 @pytest.mark.slow
@@ -327,11 +325,11 @@ def test_what_chance_parts_is_no_drift_of_an_effect_that_leaves_nothing() -> Non
     error = math.hypot(0.05, 0.05)
     by = 3.0 * error
     apart = Regime("time_s", 1.0 - 0.5 * by, 1.0 + 0.5 * by, 0.05, 0.05, 16)
-    fits = Credibility("offset", (*alike, apart))
+    fits = Credibility((*alike, apart))
     assert fits.p_value > 0.01
     assert fits.drift == 0.0
     assert fits.value == 1.0
-    leaves = Credibility("offset", (*alike, apart), 0.9, 1.0)
+    leaves = Credibility((*alike, apart), 0.9, 1.0)
     assert leaves.drift > 0.1
     assert leaves.value < 0.6
 
@@ -341,11 +339,11 @@ def test_what_chance_does_not_part_is_drift() -> None:
     apart = Regime("time_s", 0.8, 1.2, 0.03, 0.04, 20)
     multiple = float(stats.t.isf(0.5 * DRIFT_CHANCE / 2, 20))
     alike = Regime("force_N", 1.0, 1.0, 0.03, 0.04, 20)
-    two = Credibility("offset", (alike, apart))
+    two = Credibility((alike, apart))
     assert two.drift == pytest.approx(math.sqrt(0.4**2 - (multiple * 0.05) ** 2))
-    assert 0.4 > Credibility("offset", (apart,)).drift > two.drift > 0.3
-    assert Credibility("offset", ()).drift == 0.0
-    assert Credibility("offset", ()).value == 1.0
+    assert 0.4 > Credibility((apart,)).drift > two.drift > 0.3
+    assert Credibility(()).drift == 0.0
+    assert Credibility(()).value == 1.0
 
 
 def parted(rng: np.random.Generator, acting: list[int], size: float = 1.0) -> Regime | None:
@@ -378,7 +376,7 @@ def test_many_stretches_part_what_drifts() -> None:
     found = [parted(rng, list(range(20)), size=0.7) for _ in range(50)]
     assert all(one is not None and one.p_value < 0.01 for one in found)
     assert all(one is not None and 10.0 < one.freedom < 19.0 for one in found)
-    known = [Credibility("offset", (one,)).drift for one in found if one is not None]
+    known = [Credibility((one,)).drift for one in found if one is not None]
     assert 0.2 < np.median(known) < 0.3
 
 

@@ -113,7 +113,7 @@ def diagnosis_of(case: Case, effects: list[Effect], rival: Effect | None = None)
 def fit_of(nominal: Rig, effects: list[Effect]) -> Fit:
     values = {e.value_key(p): p.starts[0] for e in effects for p in e.free}
     rig = apply(nominal, "column", effects, values)
-    return Fit(tuple(effects), values, values, values, (), rig, 0.0)
+    return Fit(tuple(effects), values, values, values, (), rig)
 
 
 def needs_flight(effect: Effect) -> bool:

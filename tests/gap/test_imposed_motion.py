@@ -116,7 +116,7 @@ def test_no_force_is_proposed_to_a_bench_that_imposes_the_motion() -> None:
     named = {effect.name: effect for effect in EFFECTS}
     effect, rival = named["viscous_damping"], named["coulomb_friction"]
     fits = [
-        Fit((one,), {value: size}, {}, {}, (), damper_rig(drive="force"), 0.0)
+        Fit((one,), {value: size}, {}, {}, (), damper_rig(drive="force"))
         for one, value, size in (
             (effect, "viscous_damping.factor", 0.8),
             (rival, "coulomb_friction.friction_N", 20.0),

@@ -49,7 +49,7 @@ def record(rig: Rig, tmp_path_factory: pytest.TempPathFactory) -> Record:
 def of(rig: Rig, record: Record, **values: float) -> tuple[EffectInFlight, ...]:
     effects = tuple(BY_NAME[name] for name in values)
     flat = {effect.value_key(effect.free[0]): values[effect.name] for effect in effects}
-    found = Fit(effects, flat, {}, {}, (), apply(rig, "column", effects, flat), 0.0)
+    found = Fit(effects, flat, {}, {}, (), apply(rig, "column", effects, flat))
     again = Again.of(rig, ["column"], record)
     assert again is not None
     made = flown_with(rig, found, again)
@@ -109,5 +109,5 @@ def test_a_bench_has_none(tmp_path: Path) -> None:
     again = Again.of(bench, ["column"], record)
     assert again is not None
     effect = BY_NAME["inertia"]
-    found = Fit((effect,), {"inertia.factor": 1.3}, {}, {}, (), bench, 0.0)
+    found = Fit((effect,), {"inertia.factor": 1.3}, {}, {}, (), bench)
     assert flown_with(bench, found, again) is None

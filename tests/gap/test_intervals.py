@@ -25,7 +25,7 @@ def test_an_interval_counts_what_is_known_of_a_setting(spread: float) -> None:
     rng = np.random.default_rng(2)
     left = rng.normal(size=FRAMES)
     same = np.ones((FRAMES, 2))
-    found = End(np.zeros(2), 0.0, left - left.mean(), same, None)
+    found = End(np.zeros(2), 0.0, left - left.mean(), same)
     groups = np.arange(FRAMES) // 300
     half = half_width(found, [FRAMES], groups, np.array([0.0, 1.0 / spread**2]), NONE)
     wanted = student.ppf(0.975, 6) * np.hypot(spread, 1.0 / np.sqrt(FRAMES))
@@ -42,7 +42,7 @@ def test_numbers_that_are_known_beforehand_take_no_degree_of_freedom() -> None:
     left = np.convolve(rng.normal(size=FRAMES), np.ones(30), "same")  # too smooth for more
     groups = np.arange(FRAMES) // (FRAMES // 5)
     slopes = np.column_stack((np.ones(FRAMES), 1e-3 * rng.normal(size=(FRAMES, 6))))
-    found = End(np.zeros(7), 0.0, left - left.mean(), slopes, None)
+    found = End(np.zeros(7), 0.0, left - left.mean(), slopes)
     priors = np.array([0.0, *np.ones(6)])
     half = half_width(found, [FRAMES], groups, priors, NONE)
     alone = half_width(replace(found, jac=slopes[:, :1]), [FRAMES], groups, np.zeros(1), NONE)
@@ -54,7 +54,7 @@ def test_an_error_of_the_input_that_lasts_widens_an_interval_as_it_moves_the_est
     rng = np.random.default_rng(5)
     shape, sizes = np.sin(np.arange(FRAMES) / 40.0)[:, None], np.array([0.3, -0.2, 0.1])
     noise = rng.normal(size=FRAMES)
-    found = End(np.zeros(1), 0.0, noise, shape, None)
+    found = End(np.zeros(1), 0.0, noise, shape)
     given_error = np.outer(sizes, shape[:, 0]) + rng.normal(size=(3, FRAMES))
     groups = np.arange(FRAMES) // 300
     half = half_width(found, [FRAMES], groups, np.zeros(1), given_error)
@@ -97,7 +97,7 @@ def test_intervals_of_a_short_record_hold_and_say_something(numbers: int) -> Non
         shapes = rng.normal(size=(len(groups), numbers))
         noise = rng.normal(size=len(groups))
         found = np.asarray(np.linalg.lstsq(shapes, noise, rcond=None)[0], np.float64)
-        end = End(found, 0.0, noise - shapes @ found, shapes, None)
+        end = End(found, 0.0, noise - shapes @ found, shapes)
         half = half_width(end, [len(groups)], groups, np.zeros(numbers), NONE)
         held += abs(found[0]) < half[0]
         widths.append(half[0] * np.sqrt(len(groups)))

@@ -16,7 +16,7 @@ def judge(name: str, gaps: dict[str, float], left: dict[str, float], *doubted: s
     """Return the stages blamed by one effect, with the gaps without it and with it."""
     rig, none = nominal_rig(False), np.zeros(100)
     outputs = [Output(at, at, np.full(100, x), lambda _: none, 1.0, 60.0) for at, x in gaps.items()]
-    fit = Fit((), {}, {}, {}, (), rig, 0.0)
+    fit = Fit((), {}, {}, {}, (), rig)
     choice = Choice((Found(BY_NAME[name], 50.0, 0.9, ()),), fit, fit)
     return Judge([], outputs, choice, left, frozenset(doubted)).blamed
 

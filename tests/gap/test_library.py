@@ -98,7 +98,7 @@ def test_an_interval_has_only_values_that_a_rig_file_accepts(
     effect = BY_NAME[name]
     [p] = [one for one in effect.free if one.name == number]
     key, start, wide = effect.value_key(p), p.starts[0], 1e3
-    fit = Fit((effect,), {key: start}, {key: start - wide}, {key: start + wide}, (), flown, 0.0)
+    fit = Fit((effect,), {key: start}, {key: start - wide}, {key: start + wide}, (), flown)
     for filed in (0.0, 0.05) if p.mode == "added" else (p.nominal(flown, "column"),):
         rig = apply(flown, "column", [effect], {key: filed}) if p.mode == "added" else flown
         found = estimate(fit, effect, p, Case(rig, "column", []), 0.0)

@@ -160,7 +160,7 @@ def test_the_manoeuvre_that_separates_two_functions_moves_the_control_that_does(
         for one in terms
     ]
     fits = [
-        Fit((one,), values, values, values, (), rig, 0.0)
+        Fit((one,), values, values, values, (), rig)
         for one, (values, rig) in zip(terms, known, strict=True)
     ]
     step = Found(terms[0], 9.0, 0.5, (Candidate(9.0, terms[1], fits[1]),))

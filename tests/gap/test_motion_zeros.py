@@ -162,7 +162,7 @@ def test_what_remains_of_the_motion_counts_in_full_against_a_zero(healthy: Recor
     effect = BY_NAME["alpha_zero"]
     key, off = effect.value_key(effect.free[0]), OFF["alpha_rad"]
     right = apply(rig, "column", [effect], {key: off})
-    fit = Fit((effect,), {key: off}, {key: off}, {key: off}, (), right, 0.0)
+    fit = Fit((effect,), {key: off}, {key: off}, {key: off}, (), right)
     case = Case(rig, "column", airframe_outputs(rig, record))
     found = credibility(effect, case, fit, [record], 0.9)
     assert found.in_full

@@ -107,7 +107,7 @@ def test_a_test_is_proposed_by_the_sensors_that_the_record_has() -> None:
     fits = []
     for one, factor in ((effect, 1.0 / 1.1), (other, 1.1)):
         value = {one.value_key(one.free[0]): factor}
-        fits.append(Fit((one,), value, {}, {}, (), apply(rig, "column", [one], value), 0.0))
+        fits.append(Fit((one,), value, {}, {}, (), apply(rig, "column", [one], value)))
     step = Found(effect, 9.0, 0.5, (Candidate(9.0, other, fits[1]),))
     times = np.arange(1000) / 100.0
     noise = np.random.default_rng(3).standard_normal((3, len(times)))

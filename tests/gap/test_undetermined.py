@@ -57,7 +57,7 @@ def test_the_interval_of_what_cannot_be_negative_ends_at_zero(
     (key,) = (effect.value_key(p) for p in effect.free)
     ends = ({key: value - half / UNDERSTATED}, {key: value + half / UNDERSTATED})
     rig = bench()
-    fit = Fit((effect,), {key: value}, *ends, (), rig, 0.0)
+    fit = Fit((effect,), {key: value}, *ends, (), rig)
     choice = Choice((Found(effect, 10.0, 0.9, ()),), fit, replace(fit, effects=()))
     (found,) = effects_of(Case(rig, "column", []), choice, [], [])
     assert found.parameters[0].low == pytest.approx(low)

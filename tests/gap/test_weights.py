@@ -57,6 +57,6 @@ def test_records_of_unequal_length_keep_their_own_memories() -> None:
     rng = np.random.default_rng(8)
     smooth, white = lasting_noise(rng)[:600], rng.normal(size=4 * FRAMES)
     rows = len(smooth) + len(white)
-    end = End(np.zeros(1), 0.0, np.concatenate((smooth, white)), np.ones((rows, 1)), None)
+    end = End(np.zeros(1), 0.0, np.concatenate((smooth, white)), np.ones((rows, 1)))
     wanted = float(np.mean(smooth**2)) * memory(smooth)
     assert cost_of_unit_likelihood(end, [len(smooth), len(white)]) == pytest.approx(wanted)

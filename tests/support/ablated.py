@@ -70,7 +70,7 @@ class Known:
 
 def _key_of(fit: Fit | None) -> Any:
     """Return the identity of a fit."""
-    return None if fit is None else (fit.effects, tuple(fit.values.items()), fit.cost)
+    return None if fit is None else (fit.effects, tuple(fit.values.items()))
 
 
 @contextmanager

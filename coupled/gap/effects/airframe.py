@@ -115,10 +115,7 @@ MOTION_ZEROS: tuple[Effect, ...] = (
 
 
 def term(function: str, axis: str) -> Effect:
-    """Return the effect of a factor on a named function of an axis of the model's aerodynamics.
-
-    That of a lateral axis needs the motion of the axis.
-    """
+    """Return the effect of a factor on a named function of an axis of the model's aerodynamics."""
     number = factor(f"flight.{TERMS}{function}", 0.9, *_ANY_SIGN)
     drawn = _DRAWN.get(axis, ("alpha", "load_answer", "loop", 4.0))
     needs = _NEEDS.get(axis, ())

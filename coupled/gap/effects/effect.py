@@ -139,10 +139,7 @@ class Parameter:
         return value
 
     def bounds(self, rig: Rig, control: ControlName) -> tuple[float, float]:
-        """Return the bounds of the fit.
-
-        The lower bound of an `added` parameter that cannot be negative removes the nominal value.
-        """
+        """Return the bounds of the fit; an addition to a nonnegative value may remove all of it."""
         removes = self.mode == "added" and self.low == 0.0
         return -float(self.nominal(rig, control)) if removes else self.low, self.high
 
@@ -190,10 +187,7 @@ class Switch(Parameter):
 
 @dataclass(frozen=True)
 class Signature:
-    """How an effect is drawn: y against x as a law, a loop or over time, and the zoom's length, s.
-
-    `x` and `y` are names in `plots.signals`.
-    """
+    """How an effect is drawn: y against x, names in `plots.signals`, and the zoom's length, s."""
 
     x: str
     y: str
@@ -213,8 +207,7 @@ class Sampled(NamedTuple):
     """The sampling error of a random effect.
 
     `error` returns the relative standard error of the fitted value as an estimate of the process
-    parameter, given the nominal rig and a record. `times` returns the times of events, s from the
-    record's start; it is None for a continuous process.
+    parameter, given the nominal rig and a record; `times` those of its events, s from the start.
     """
 
     error: Callable[[Rig, Record], float]
@@ -409,7 +402,7 @@ BY_LOAD = "loader.friction_by_load"
 def _level(rig: Rig, control: ControlName, changes: Mapping[str, Any]) -> float:
     """Return the dry friction of a rig with changes, N, that sets its contact stiffness.
 
-    Of friction by direction the mean counts, and friction by load at a light load.
+    Friction by load counts at a light load.
     """
 
     def of(key: str) -> float:
@@ -420,10 +413,7 @@ def _level(rig: Rig, control: ControlName, changes: Mapping[str, Any]) -> float:
 
 
 def _breakaway(rig: Rig, control: ControlName, changes: Mapping[str, Any]) -> dict[str, float]:
-    """Return the breakaway force that a change of the running friction moves with it.
-
-    Friction that is added adds at rest, too, so the excess of the breakaway force stays.
-    """
+    """Return the breakaway force that a change of the running friction moves by as much."""
     if FRICTION not in changes or BREAKAWAY in changes:
         return {}
     filed, running = (float(value_of(rig, control, key)) for key in (BREAKAWAY, FRICTION))

@@ -34,8 +34,7 @@ HUM_Hz = 5.0  # the slowest hum, or alias of one
 def hums(outputs: Sequence[Output], rig: Rig, control: ControlName) -> list[dict[str, float]]:
     """Return amplitude, d, frequency, Hz, and phase, rad, of the strongest hum, if there is one.
 
-    Only the first record is used: the phase differs between records (`reading`). A tone of mains
-    may have an alias at any frequency.
+    That of the first record: the phase differs between records (`reading`).
     """
     ours = [output for output in outputs if output.stage == "loader"]
     if not ours:
@@ -54,10 +53,7 @@ def hums(outputs: Sequence[Output], rig: Rig, control: ControlName) -> list[dict
 
 
 def ripples(outputs: Sequence[Output], rig: Rig, control: ControlName) -> list[dict[str, float]]:
-    """Return amplitude, N, period, d, and phase, rad, of the strongest ripples, if there are any.
-
-    The ripple with the largest projection of the residual comes first.
-    """
+    """Return amplitude, N, period, d, and phase, rad, of the strongest ripples, strongest first."""
     ours = [
         output for output in outputs if output.stage == "loader" and "force" not in output.channel
     ]
@@ -88,10 +84,7 @@ def ripples(outputs: Sequence[Output], rig: Rig, control: ControlName) -> list[d
 
 
 def _wave(both: Floats, left: Floats, period: float) -> tuple[dict[str, float], float]:
-    """Return the ripple of one period, and its projection of the residual's power.
-
-    `both` are the responses to its sine and cosine.
-    """
+    """Return a ripple by its responses to sine and cosine, and the residual's power on them."""
     sine, cosine = np.linalg.lstsq(both, left, rcond=None)[0]
     values = {
         "ripple_N": float(np.hypot(sine, cosine)),
@@ -146,10 +139,7 @@ SATURATED = (0.5, 1.0, 1.5, 2.0, 3.0, 5.0)  # K·F over the limit: from a slope 
 
 
 def modes(outputs: Sequence[Output], rig: Rig, control: ControlName) -> list[dict[str, float]]:
-    """Return bend, d/N, frequency, Hz, and damping ratio of the mode that takes most of a residual.
-
-    Return none if no mode takes anything of it, such as without a force.
-    """
+    """Return bend, d/N, frequency, Hz, and damping ratio of the mode that takes most, if any."""
     ours = [output for output in outputs if output.stage == "linkage"]
     if not ours:
         return []
@@ -173,9 +163,8 @@ def saturations(
 ) -> list[dict[str, float]]:
     """Return bend, d/N, and limit, d, of the stiffening bend that leaves the smallest residual.
 
-    The largest deflection under the record's force, A, and its mean slope K follow from the linear
-    bend. If K·F is x limits at the largest force, the limit is A/tanh(x), and the bend at no force
-    K·x/tanh(x). Return none if no bend reduces the residual.
+    The linear bend has the mean slope K and the largest deflection A. If K·F is x limits at the
+    largest force, the limit is A/tanh(x), and the bend at no force K·x/tanh(x).
     """
     ours = [output for output in outputs if output.stage == "linkage"]
     if not ours:

@@ -67,10 +67,7 @@ def settings(rig: Rig, control: ControlName, outputs: Sequence[Output] = ()) -> 
 
 
 def _only_beside_others(rig: Rig, control: ControlName) -> list[Effect]:
-    """Return the parameters with a tolerance in the rig file that no effect has alone.
-
-    Each is an effect by the name of its key, as the damping ratio of `servo_tuning`.
-    """
+    """Return the parameters with a tolerance in the rig file that no effect has alone."""
     given = rig.controls[control].tolerance
     free = {p.key for one in contact(rig, control) for p in one.free}
     found = {
@@ -128,10 +125,7 @@ def is_dry(rig: Rig, control: ControlName) -> bool:
 
 
 def _ends(effect: Effect, rig: Rig, control: ControlName) -> tuple[float, float, float] | None:
-    """Return the tolerance limits of an effect's parameter, and its neutral value.
-
-    None without a tolerance, and for an effect of several parameters.
-    """
+    """Return tolerance limits and neutral value of an effect's only parameter; None without."""
     if len(effect.parameters) != 1 or not effect.free:
         return None
     (number,) = effect.free

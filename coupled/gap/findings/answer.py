@@ -50,10 +50,9 @@ def verdict_of(
     An effect without alternative that is not certain counts as unexplained, since it may imitate
     a fault outside the library. `mostly`: residual structure remains, but the certain effects hold
     at least `MOST` of every faulty stage's gap, or of all gaps together. Where no structure remains
-    in a stage, alternatives that are certain together hold their share as well. With alternatives
-    the verdict is `ambiguous` if no set of effects has more than half of the probability, or an
-    effect that has them is not certain; but not if none of them is credible and the certain effects
-    hold that share.
+    in a stage, alternatives that are certain together hold their share as well. `ambiguous`: no set
+    of effects has more than half of the probability, or an effect with alternatives is not certain;
+    but not if none of these is credible and the certain effects hold that share.
     """
     faulty = [stage for stage in stages if stage.guilty]
     blamed = {step.effect.stage for step in choice.steps}
@@ -100,8 +99,8 @@ def incredible(choice: Choice, effects: Sequence[EffectResult]) -> frozenset[str
 def _held_together(stages: Sequence[StageResult], shares: Sequence[float]) -> float:
     """Return the share that the effects explain of the gaps of all faulty stages together.
 
-    A gap is weighted by its logarithm, since the noise floors of two stages have no common unit.
-    A stage without an output of its own has the gap of its neighbours with the filed rig.
+    A gap is weighted by its logarithm, since noise floors have no common unit. A stage without an
+    output has the gap of its neighbours with the filed rig.
     """
     sizes = [math.log(max(stage.settled or stage.gap or 1.0, 1.0)) for stage in stages]
     held = sum(size * min(share, 1.0) for size, share in zip(sizes, shares, strict=True))
@@ -113,7 +112,7 @@ def settings_of(
 ) -> tuple[SettingResult, ...]:
     """Return the fitted nuisance parameters, each as a factor on its filed value, or as a delay.
 
-    Without effects they are within their tolerance, as the stages are judged then.
+    Without effects they are within their tolerance, as in the judgement of the stages.
     """
     fit = choice.fit if choice.steps else choice.without_effects
     found = []
@@ -139,9 +138,9 @@ def effects_of(
     """Return the effects found, the largest log-likelihood gain first.
 
     The probability of an effect falls with its credibility. It is at most `STATED_MOST`, the share
-    of correct effects among the most probable ones, and just below `CERTAIN` if the interval
-    of its size contains the neutral value. Several values that a record cannot separate may each
-    have such an interval, although they are not all neutral: then the evidence decides.
+    of correct effects among the most probable ones, and just below `CERTAIN` if the interval of its
+    size contains the neutral value. If values cannot be separated, each interval may contain it,
+    although they are not all neutral: then the evidence decides.
     """
     remains = {stage.name: stage.remainder for stage in stages}
     records = [reader.record for reader in readers]

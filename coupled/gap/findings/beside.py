@@ -46,8 +46,8 @@ def beside_closed_form(
 ) -> Beside | None:
     """Return the effects found, beside the closed form of the only curve.
 
-    Return None if there are no effects, no closed form without kinks (its curve would be off where
-    a kink is misplaced, and the effects with it), or if it explains less than the curve.
+    None if there are no effects, if there is no closed form without a kink, whose place is known
+    only roughly, or if the form explains less than the curve.
     """
     formed = curves.in_closed_form(case)
     if formed is None or not effects:

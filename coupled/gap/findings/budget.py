@@ -40,7 +40,7 @@ def shapley_subsets(players: int) -> tuple[list[int], Floats]:
     """Return the subsets whose powers are needed, and their weights, (players, subsets).
 
     Subset 0 is the first and that of all players the last. For more than `MOST_PLAYERS` players,
-    the reductions of each as the first and as the last player are averaged. That is exact if the
+    the reductions of each as the first and as the last one are averaged, which is exact if the
     power is the mean square of a sum of the players' actions.
     """
     if players <= MOST_PLAYERS:
@@ -176,9 +176,9 @@ def _shares(
 ) -> Floats:
     """Return the shares of the effects, of unexplained structure and of noise; sum 1.
 
-    `weights` are those of Shapley. `powers` are sums of squares, floors², by subset of the effects
-    and stretch; subset 0 is empty. `frames` are the numbers of frames of the stretches, `noise` the
-    power of noise on each with the effects, floors². `pick` are the stretches that count.
+    `weights` are those of Shapley, `powers` sums of squares, floors², by subset of the effects
+    and stretch; subset 0 is empty. By stretch, `frames` are numbers of frames and `noise` the power
+    of noise with the effects, floors²; `pick` are the stretches that count.
     """
     counts = frames[pick]
     power = powers[:, pick].sum(axis=1) / counts.sum()
@@ -198,9 +198,9 @@ def _shares(
 class ChannelShrink(Plain):
     """One channel's RMS residual on held-out stretches, in its own unit, and its noise floor.
 
-    `closed` is (before − after)/(before − floor) with its 95 % interval; None if no effect was
-    found or there was no gap. There is no interval if stretches drawn anew may have no gap.
-    `reliable`: computed from at least `FEW_STRETCHES` stretches.
+    `closed` is (before − after)/(before − floor) with its 95 % interval; None without an effect or
+    a gap. There is no interval if stretches drawn anew may have no gap. `reliable`: from at least
+    `FEW_STRETCHES` stretches.
     """
 
     channel: str

@@ -84,8 +84,8 @@ class Interval:
         """Return the two-sided interval at a probability of a false alarm, `chance`.
 
         `well` and `now` have one value a record; `unsure` is added to the limits; `least` is the
-        least standard deviation that is taken for the healthy ones; `more` is the variance of a
-        value of `now` beyond that of a healthy one.
+        least standard deviation of the healthy ones; `more` the variance of a value of `now` beyond
+        that of a healthy one.
         """
         n, m = len(well), len(now)
         difference = float(now.mean() - well.mean())
@@ -247,8 +247,7 @@ def compare(
 ) -> Comparison:
     """Return records tested against healthy ones, each with the outputs that they let judge.
 
-    `rig` is the one whose predictions are taken off, and knows nothing of either. The `force` on
-    the control is tested too.
+    The predictions of `rig` are subtracted. The `force` on the control is tested too.
     """
     healthy, tested = (_signals(rig, control, *each, force) for each in (well, now))
     pull = channel(control, "force")

@@ -46,8 +46,8 @@ from coupled.record.record import Record
 class Regime:
     """An effect's size in two halves of the records, relative to its size in all, with errors.
 
-    `by` is the signal that divides the records, `low` the half in which it is smaller. `freedom`
-    is the number of degrees of freedom of the errors.
+    `by` is the signal that divides the records, `low` the half in which it is smaller, `freedom`
+    the number of degrees of freedom of the errors.
     """
 
     by: str
@@ -169,7 +169,7 @@ def _size(
 
     The standard error is from a jackknife over stretches, plus a `lasting` error of the residual,
     rms, in proportion to the action. The sample size is the effective number of stretches with
-    the action (Kish): two, if a limit is reached in two stretches only.
+    the action (Kish).
     """
     power = float(action @ action)
     more = float(left @ action) / power
@@ -188,14 +188,13 @@ def _size(
 class Credibility:
     """Results of the tests of one effect.
 
-    `remainder` is the weight of the residual that remains, 0 to 1 (`remainder`). `beside_flexible`
-    is None if hardly any residual remains. `in_full`: no residual may remain, since the model of
-    signals has no power. `exact`: the stage is computed by the host without noise, so the limit of
-    the drift is lower too. `undone` is the power of the effect's action on an output without a gap,
-    relative to the power that its limit allows, less 1: the largest of all outputs, at least 0.
+    `remainder` is the weight of the residual that remains, 0 to 1 (`remainder`); `beside_flexible`
+    is None if hardly any does. `in_full`: none may remain, since the model of signals has no
+    power. `exact`: the host computes the stage without noise, so the limit of the drift is lower
+    too. `undone` is the power of the effect's action on an output without a gap, relative to the
+    power that its limit allows, less 1: the largest of all outputs, at least 0.
     """
 
-    effect: str
     regimes: tuple[Regime, ...]
     beside_flexible: float | None = None
     remainder: float = 0.0
@@ -207,9 +206,8 @@ class Credibility:
     def drift(self) -> float:
         """The largest significant difference of the sizes in two halves, relative to the size.
 
-        The significance level is `DRIFT_CHANCE` over the number of pairs (Bonferroni) if the
-        effects leave no residual, since nearly all such effects are correct. It rises to 1 with
-        the residual that remains.
+        The significance level is `DRIFT_CHANCE` over the number of pairs (Bonferroni) without a
+        residual, since nearly all such effects are correct. It rises to 1 with the residual.
         """
         chance = (DRIFT_CHANCE / max(len(self.regimes), 1)) ** (1.0 - self.remainder)
         return max((one.apart(chance) for one in self.regimes), default=0.0)
@@ -246,10 +244,10 @@ def remainder(gap: float, left: float, explained_below: float, own: float = 1.0)
     """Return the weight of a stage's remaining residual as evidence against its effects, 0 to 1.
 
     `gap` is the gap without effects, `left` that with them, `explained_below` the largest gap of
-    an explained stage. The weight grows with the excess of `left` over `explained_below`, and with
-    the share of the gap that remains: effects that remove nearly all of a large gap are usually
-    correct. `own` is the machine's own error, the gap that also a nonparametric model beside the
-    effects leaves: no function of the stage's signals, and no evidence against a law.
+    an explained stage. The weight grows with the excess of `left` over it, and with the share of
+    the gap that remains: effects that remove nearly all of a large gap are usually correct. `own`
+    is the machine's own error, the gap that a nonparametric model beside the effects leaves too: no
+    function of the stage's signals, and no evidence against a law.
     """
     error = max(own, 1.0) ** 2
     more, known = max(left**2 - error, 0.0), explained_below**2 - 1.0
@@ -264,7 +262,7 @@ def credibility(
     """Return an effect's credibility; `remains` is the weight of the residual (`remainder`)."""
     acts = [Acts(one, records[one.record], *each) for one, *each in case.actions(found, effect)]
     undone = _undone(case, found, acts)
-    plain = Credibility(effect.name, regimes(case, acts), remainder=remains, undone=undone)
+    plain = Credibility(regimes(case, acts), remainder=remains, undone=undone)
     if effect.stage == "schedule":
         return replace(plain, exact=True)
     if remains < FEW or not acts or effect.signature.drawing == "time":
@@ -276,10 +274,7 @@ def credibility(
 
 
 def _undone(case: Case, found: Fit, acts: Sequence[Acts]) -> float:
-    """Return the excess action of an effect on outputs without a gap (`Credibility.undone`).
-
-    The nuisance parameters are those fitted with the effects.
-    """
+    """Return the excess action of an effect on outputs without a gap (`Credibility.undone`)."""
     if len(found.effects) < 2:
         return 0.0
     bare, most = case.with_only(found, ()), 0.0

@@ -52,7 +52,7 @@ Values = tuple[Floats, Floats]  # nodes and values of a curve
 class Law:
     """A curve that a rig may have: its key of a control, its stage, and its signal.
 
-    `signal` is a name in `where.signals`, `symbol` that of closed forms. `scale` is a signal of the
+    `signal` is a name in `where.signals`, `symbol` that of closed forms, `scale` a signal of the
     size of its values. `by_size`: of the signal's size only. `anchored`: it vanishes at 0, where a
     named effect acts. `is_map`: its value replaces the signal.
     """
@@ -152,10 +152,7 @@ def rising(places: Floats) -> Floats:
 
 
 def places_of(signal: Floats, law: Law, entries: Sequence[float]) -> Floats:
-    """Return where a curve may have nodes: evenly spaced, at quantiles, at 0 and at entries.
-
-    From the least value of the signal to the largest; through 0, where the signal has both signs.
-    """
+    """Return where a curve may have nodes: evenly spaced, at quantiles, at 0 and at entries."""
     low, high = float(signal.min()), float(signal.max())
     if law.by_size:
         low = 0.0
@@ -238,8 +235,8 @@ class Posterior:
 class Basis:
     """The responses to a unit of a law's value at each place, about a fitted curve.
 
-    `columns` are those of each output, shape (frames, places), `wanted` its residual without the
-    curve, linearised.
+    `columns` are those of each output, (frames, places), `wanted` its linearised residual without
+    the curve.
     """
 
     law: Law
@@ -341,10 +338,7 @@ def with_nodes(basis: Basis, sums: Sums, at: Sequence[int]) -> Pick:
 
 
 def choose(basis: Basis, sums: Sums, entries: Sequence[float]) -> Pick:
-    """Return the curve with the nodes of the largest evidence.
-
-    The search begins at the ends, and again at the entries of the schedule.
-    """
+    """Return the curve with nodes of the largest evidence, from its ends, and from the entries."""
     ends = {0, len(basis.places) - 1, *np.flatnonzero(basis.places == 0.0).tolist()}
     own = ends | {*np.flatnonzero(np.isin(basis.places, entries)).tolist()}
     starts = [ends, own] if len(ends) < len(own) < CURVE_NODES else [ends]
@@ -354,7 +348,8 @@ def choose(basis: Basis, sums: Sums, entries: Sequence[float]) -> Pick:
 
 def straight(basis: Basis, sums: Sums) -> float:
     """Return the largest log evidence of a straight line, which the library's effects have."""
-    return max(_log_of(sums.of(line)) for line in _lines(basis))
+    known = (_free(sums.of(line)) for line in _lines(basis))
+    return max((one.log for one in known if one is not None), default=-math.inf)
 
 
 def _lines(basis: Basis) -> list[Floats]:
@@ -369,8 +364,7 @@ def _lines(basis: Basis) -> list[Floats]:
 def _grown(basis: Basis, sums: Sums, start: Pick, ends: set[int]) -> Pick:
     """Return the curve of a forward and then backward selection of nodes by the evidence.
 
-    A node that lowers the evidence is kept for one step more, since two nodes together may raise
-    it.
+    A node that lowers it is kept for one step more, since two nodes together may raise it.
     """
     best = last = start
     while len(last.at) < CURVE_NODES and len(last.at) <= len(best.at) + 1:
@@ -448,12 +442,6 @@ def _bent_at(places: Floats, shape: Floats) -> NDArray[np.intp]:
         kinks = np.argmin(np.abs(places[:, None] - even), axis=0)
     zero = np.flatnonzero(places == 0.0)
     return np.unique(np.concatenate(([0, len(places) - 1], zero, kinks)))
-
-
-def _log_of(sums: Sums) -> float:
-    """Return the log evidence of a few independent sizes (`_free`)."""
-    known = _free(sums)
-    return -math.inf if known is None else known.log
 
 
 def _free(sums: Sums) -> Posterior | None:

@@ -83,8 +83,8 @@ class Curve:
     """A function of one signal that reproduces a residual; it does not state the cause.
 
     `key` is that of the rig file, `of` and `lists` its keys of the nodes and of the values. `unit`
-    is that of the values, `low` and `high` their 95 % intervals. `closed` is the share of the gap
-    closed on held-out stretches, with its interval. `form` is a closed form that fits as well.
+    is that of the values, `low` and `high` their 95 % intervals, `closed` the share of the gap
+    closed on held-out stretches, with its interval, `form` a closed form that fits as well.
     """
 
     key: str
@@ -132,9 +132,8 @@ class Curve:
 class Curves:
     """The curves found, and the rig with the credible effects and with them.
 
-    `shrink` is the reduction of the gap in each channel that they change, with curves that are
-    fitted to the other stretches. `instead` are the effects that the curves describe better, each
-    with its odds against the curves.
+    `shrink` is the reduction of the gap in each channel that they change, with curves fitted to
+    the other stretches. `instead` are the effects that the curves describe better, with their odds.
     """
 
     found: tuple[Curve, ...]
@@ -182,9 +181,9 @@ def find_curves(
 ) -> Curves | None:
     """Return curves of the stages that the credible effects do not explain; None if none.
 
-    The curves are fitted beside the credible effects. Several effects of such a stage may be terms
-    of a series that approximates one curve: they compete with the curves without them, by evidence.
-    A single law that leaves little may only be rough, and does not compete.
+    They are fitted beside the credible effects. Several effects of such a stage may be terms of a
+    series that approximates one curve: they compete with the curves without them, by evidence. A
+    single law that leaves little may only be rough, and does not compete.
     """
     sure = {one.name for one in effects if one.probability >= CERTAIN}
     problem = Problem(case)
@@ -278,10 +277,7 @@ _Found = tuple[Curve, Rig, Law, Values, float]
 
 @dataclass(frozen=True)
 class _Fitter:
-    """Fits curves beside the effects of `base` and the curves of `rig`.
-
-    `whole` is the fit of all effects found, which a curve must beat.
-    """
+    """Fits curves beside the effects of `base` and the curves of `rig`, to beat the `whole` fit."""
 
     case: Case
     problem: Problem
@@ -295,9 +291,9 @@ class _Fitter:
 
         All laws compete by the evidence of their linear models, also those that no rig can have:
         their residual follows no other signal. The others that gain are fitted further, since a
-        response is far from linear in a large curve, and compete again. Of laws that the data do
-        not tell apart, the first that a rig can have is taken: a bend, or beyond the least bend
-        what the force adds to the reading at the grip.
+        response is not linear in a large curve, and compete again. Of laws that the data do not
+        discriminate, the first that a rig can have is taken: a bend, or beyond the least bend what
+        the force adds to the reading at the grip.
         """
         begun = [one for law in LAWS if (one := self._begun(law, stages)) is not None]
         above = [pick.known.log - self._likelihood(basis, self.rig) for basis, pick in begun]
@@ -526,8 +522,7 @@ def response_to_force(
 ) -> Floats:
     """Return an output's response to a force against δc, N at the frames, in floors.
 
-    The force is that of a bob weight of 1 N/g, whose load factor is the force; those of rig and
-    record are left out of the difference.
+    It is the force of a bob weight of 1 N/g in an equal load factor.
     """
     if output.stage != "loader":
         return np.zeros(len(output.measured))

@@ -71,7 +71,7 @@ class Diagnosis(Findings, TableResult):
 
     `parts` are the diagnoses that it consists of: one, or that of each judged control and of the
     airframe. `closed_loop`, `in_flight`, `next_tests` and `power` are computed on first use: each
-    simulates the rig and takes as long as the diagnosis or longer.
+    takes as long as the diagnosis or longer.
     """
 
     shrink: Shrink

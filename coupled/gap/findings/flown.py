@@ -150,10 +150,7 @@ class Again:
         return made
 
     def differences(self, rig: Rig, names: Sequence[str]) -> tuple[dict[str, float], float] | None:
-        """Return the RMS differences of a rig's flight from the record, and over which time, s.
-
-        None if it cannot be flown.
-        """
+        """Return the RMS differences of a rig's flight from the record, and its time, s."""
         flown, record = self.fly(rig), self.record
         if flown is None:
             return None
@@ -200,11 +197,10 @@ RATES: Mapping[ControlName, tuple[str, ...]] = {
 class EffectInFlight(Plain):
     """The change of the flight by one effect, by channel.
 
-    `shares` are of the power of the change by all effects, and sum to 1; negative if the effect
+    `shares` are of the power of the change by all effects, sum 1; negative if the effect
     counteracts the others. `changes` are the RMS differences if the effect is removed, in the
-    channel's unit. `of_motion` is the same over the RMS of the channel's motion, with all effects
-    or with none, whichever is larger. `share` is over all channels, each normalised by its motion.
-    `control` is that of the effect where several are judged; None for the airframe.
+    channel's unit; `of_motion` the same over the RMS of the channel's motion, with all effects or
+    with none, whichever is larger. `share` is over all channels, each normalised by its motion.
     """
 
     name: str
@@ -229,8 +225,7 @@ def in_flight(
     """Return the change of the flight by each effect, largest first; None if it cannot be flown.
 
     `effects` are the control and the name of each, `rig_with` returns the rig with those of the
-    given indices, `controls` are the judged ones. Time stamps of the recorder are set to zero,
-    since they do not affect the flight.
+    given indices. Time stamps of the recorder are zero, since they do not affect the flight.
     """
     if rig_with(()).flight is None or not effects:
         return None
@@ -283,10 +278,7 @@ def _unstamped(rig: Rig, controls: Sequence[ControlName]) -> Rig:
 
 
 def in_words(effects: Sequence[EffectInFlight], credible: Collection[str]) -> str:
-    """Return in words how the effects change the flight, and which to correct first.
-
-    It is the one of the largest share among the `credible` effects, given by their labels.
-    """
+    """Return how the effects change the flight, and which of the `credible` to correct first."""
     shown = [effect for effect in effects if effect.shows]
     if not shown:
         return "In flight the effect is small: no channel of the motion changes by 1 %."

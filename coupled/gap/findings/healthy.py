@@ -40,10 +40,9 @@ from coupled.rig.rig import Rig
 class ModelError:
     """The model error of one channel: its residual on the healthy machine, without noise.
 
-    `rms` and `moves`, the channel's standard deviation, are in its unit; `rate` is the standard
-    deviation of its change per frame. `by_stretch` and `by_record` are relative standard
-    deviations of the rms between stretches and between records. `misses` is the largest gap of a
-    record; 0 if no record has a gap beyond noise.
+    `rms` and `moves`, the channel's standard deviation, are in its unit; `rate` is that of its
+    change per frame. `by_stretch` and `by_record` are relative standard deviations of the rms
+    between stretches and between records. `misses` is the largest gap of a record beyond noise.
     """
 
     rms: float
@@ -81,8 +80,7 @@ class ModelError:
     def raised(self, output: Output) -> Output:
         """Return an output with the model error added to its noise floor.
 
-        The error is scaled up by how much larger or faster the motion is than in the healthy
-        records.
+        It is scaled by how much larger or faster the motion is than in the healthy records.
         """
         larger = max(1.0, float(np.std(output.measured)) / max(self.moves, 1e-300))
         larger = max(larger, _rate(output) / max(self.rate, 1e-300))
@@ -114,10 +112,9 @@ def _rate(output: Output) -> float:
 def tolerances(case: Case, found: Fit) -> dict[str, float]:
     """Return the tolerances of the fitted parameters by key, in the keys' units.
 
-    They are `SIGMAS` standard deviations between records. For a single record they are
-    those between its halves, and at least a share of the effect, as both halves have one motion.
-    Parameters that an effect has only beside others stay as fitted: some records do not determine
-    them, and their scatter would then absorb a change of another parameter.
+    They are `SIGMAS` standard deviations between records; of a single record, between its halves,
+    and at least a share of the effect, as both halves have one motion. Parameters that an effect
+    has only beside others stay as fitted: their scatter might absorb a change of another parameter.
     """
     numbers = sorted({output.record for output in case.outputs})
     single = len(numbers) == 1
@@ -147,7 +144,7 @@ def tolerances(case: Case, found: Fit) -> dict[str, float]:
 class Baseline:
     """The healthy machine: its rig, the effects found in it, and the model errors.
 
-    `records` are those by their files, `case` has the outputs of the rig as filed. `had` are the
+    `records` are those by their files, `case` has the outputs of the rig as filed, `had` are the
     effects found in them, `errors` the model's by channel.
     """
 
@@ -170,14 +167,14 @@ class Baseline:
         return cls(records, case, rig, found.effects, errors)
 
     def compared(
-        self, records: Sequence[Record], outputs: Sequence[Output], force: bool = True
+        self, records: Mapping[str, Record], outputs: Sequence[Output], force: bool
     ) -> Comparison:
-        """Return records, with their outputs, tested against the healthy ones.
-
-        The `force` on the control is tested too.
-        """
-        well = (list(self.records.values()), self.case.outputs)
-        return compare(self.case.nominal, self.case.control, well, (records, outputs), force)
+        """Return records, with their outputs, tested against the healthy ones (`compare`)."""
+        well, now = (
+            (list(self.records.values()), self.case.outputs),
+            (list(records.values()), outputs),
+        )
+        return compare(self.case.nominal, self.case.control, well, now, force)
 
     def raised(self, outputs: Sequence[Output]) -> list[Output]:
         """Return outputs with the model error in their noise floors, where it is known."""
@@ -236,8 +233,8 @@ def beside_healthy(
     """Return the verdict and the stages with what a comparison with healthy records shows.
 
     A stage that changed without an effect for it is faulty. A stage whose floor hides a gap is
-    judged by the comparison instead. Where no change of a tenth would have been shown, by the
-    comparison or by noise, no verdict is given.
+    judged by the comparison instead. No verdict is given where neither the comparison nor noise
+    would have shown a change of a tenth.
     """
     decided = verdict not in ("no_gap", "ambiguous") or any(stage.guilty for stage in stages)
     if decided or baseline is None or change is None:

@@ -52,9 +52,8 @@ class Judge:
     def blamed(self) -> set[str]:
         """The stages of the effects found.
 
-        The stage of an effect that shows only in other stages is included if the effect closes
-        half of a gap there. If the effect is in `doubted`, the stage with the largest gap is
-        included instead.
+        The stage of an effect that shows only in others is included if the effect closes half of a
+        gap there; if the effect is in `doubted`, the stage with the largest gap instead.
         """
         root = stage_gaps(self.outputs, self.choice.without_effects.rig)
         found: set[str] = set()
@@ -123,8 +122,8 @@ class Judge:
     def _sensing(self, before: Mapping[str, float]) -> StageResult:
         """Return sensing: faulty if its effect was found, else not judged.
 
-        A wrong sensor scale has no residual of its own, but shows in several other stages. The
-        largest of their gaps is its gap. An effect of the sensors of the motion shows elsewhere.
+        A wrong sensor scale has no residual of its own: its gap is the largest of the stages in
+        which it shows. An effect of the sensors of the motion shows elsewhere.
         """
         shown = dict.fromkeys(stage_of(o) for o in STAGE_OF["sensing"].effects_show_in)
         neighbours = tuple(name for name in shown if name in before)

@@ -105,8 +105,8 @@ def _signature(
 ) -> float:
     """Return the largest rms signature of an effect in an output, nuisance parameters profiled.
 
-    It is relative to the signature that raises a residual of noise alone to the output's limit; 0
-    if the rig cannot have the effect.
+    It is relative to that which raises a residual of noise to the output's limit; 0 if the rig
+    cannot have the effect.
     """
     rig = possible(nominal, control, [effect], _values(effect, size, nominal, control))
     if rig is None:
@@ -300,10 +300,7 @@ def _shapes(time: Floats) -> list[tuple[str, Floats]]:
 def _pressures(
     nominal: Rig, record: Record, control: ControlName, frames: int
 ) -> list[tuple[str, Floats, Rig]]:
-    """Return a test's possible q̄: as recorded, and over the bench's table or at a higher speed.
-
-    A bench whose gradient is the same at any q̄ has one, without words.
-    """
+    """Return a test's possible q̄: as recorded, and over the bench's table or at a higher speed."""
     name = "dynamic_pressure_Pa"
     usual = float(np.median(record[name])) if name in record else 0.0
     level = np.full(frames, usual)

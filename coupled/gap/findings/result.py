@@ -51,8 +51,8 @@ class StageResult:
 
     `settled` is the gap with fitted nuisance parameters, `left` that with the effects found,
     `limit` the largest gap of noise alone. `shown_in` are the stages in which a fault of this one
-    shows, if it has no residual of its own. `hidden`: it is not judged, since its noise floor
-    could hide a gap; it is `guilty` only if it changed since the healthy records.
+    shows, if it has no residual of its own. `hidden`: its noise floor could hide a gap; it is
+    `guilty` only if it changed since the healthy records.
     """
 
     name: str
@@ -121,11 +121,10 @@ class StageResult:
 class ParameterEstimate:
     """A parameter with its 95 % interval; a bound is None if the records do not determine it.
 
-    `key` is that of the rig file, in `unit`; `filed` is its value there, or None if the rig has
-    none. `found` is the estimate of that number, with the interval `found_low` to `found_high`.
-    `value`, with `low` and `high`, is the effect's own parameter: that number, a factor on it, or
-    an addition to it. `host` is the host's name of the number, if it has one. `relative`: the
-    change is given as a share of the filed value.
+    `filed` is the value of `key` in the rig file, in `unit`, None if the rig has none; `found` its
+    estimate, with the interval `found_low` to `found_high`. `value`, with `low` and `high`, is the
+    effect's own parameter: that number, a factor on it, or an addition to it. `host` is the host's
+    name of the number, if any. `relative`: the change is stated as a share of the filed value.
     """
 
     name: str
@@ -157,10 +156,7 @@ class ParameterEstimate:
 
 @dataclass(frozen=True)
 class EffectResult:
-    """An effect found, with the probability that it is the cause.
-
-    `of` is the aerodynamic function that it scales, if it is a term of the model.
-    """
+    """An effect found, and the probability that it is the cause; `of`: its aerodynamic function."""
 
     name: str
     stage: str
@@ -207,8 +203,8 @@ class EffectResult:
 class SettingResult:
     """A fitted nuisance parameter, as a factor on its nominal value.
 
-    For filed friction without a filed stiffness, `yields` is its presliding displacement instead,
-    m or rad; for a time stamp, `late_s` is its delay.
+    `yields` is the presliding length instead, m or rad, of friction without a filed stiffness;
+    `late_s` the delay of a time stamp.
     """
 
     name: str

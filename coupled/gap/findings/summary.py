@@ -402,8 +402,7 @@ def changed(
 ) -> list[str]:
     """Return each parameter's key and change.
 
-    `fitted_again` are values of a rig fitted without the other effects, by the parts of their keys.
-    They replace those found.
+    Values `fitted_again` without the other effects, by their keys' parts, replace those found.
     """
     now = {f".{'.'.join(parts)}": value for parts, value in fitted_again.items()}
     lines = []

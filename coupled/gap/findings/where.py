@@ -61,9 +61,9 @@ def free_share(
 ) -> tuple[float, str]:
     """Return the share of a residual's power that the best model predicts, 0 to 1, and its signal.
 
-    `left` is the residual in noise floors, shape (frames,), as each signal. `response` is the
-    digital filter from a force inside the stage to its output. The share is that on held-out
-    stretches; the signal is `ALL` for a model of all signals.
+    The share is on held-out stretches; the signal is `ALL` for a model of all signals. `left` is
+    the residual in noise floors, shape (frames,), `response` the digital filter from a force inside
+    the stage to its output.
     """
     plain = {name: (s - s.mean()) / s.std() for name, s in signals.items() if s.std() > 0.0}
     each = {name: _functions(signal, output.frame_rate_Hz) for name, signal in plain.items()}
@@ -89,8 +89,8 @@ def _functions(signal: Floats, rate_Hz: float) -> Floats:
 def _taken(output: Output, left: Floats, columns: Floats) -> float:
     """Return the share of the residual's power that the functions predict on held-out stretches.
 
-    The held-out stretches also select the ridge parameter. The residual is autocorrelated, so
-    cross-validation by single frames would overfit.
+    These also select the ridge parameter. Cross-validation by single frames would overfit, since
+    the residual is autocorrelated.
     """
     fitted = output.rows("fitted")
     remains = np.zeros(len(RIDGES))
@@ -136,8 +136,7 @@ class Where:
     """A description of a stage's gap, from the channel in which it is largest.
 
     `loud` is the share of time with the gap. `begins` and `ends` are None if the excitation can
-    explain them; `by_pressure` is empty if q̄ is constant; `line` is None if the spectrum has no
-    line.
+    explain them; `by_pressure` is empty if q̄ is constant; `line` is None without a line.
     """
 
     channel: str
@@ -218,8 +217,8 @@ def where(output: Output, rig: Rig, record: Record, control: ControlName) -> Whe
 def lone_channel(outputs: Sequence[Output], rig: Rig) -> str:
     """Return a sentence on the only channel of the motion with a gap; empty if there are others.
 
-    An error of the aircraft's forces shows in several, of which a small one may exceed the limit of
-    one alone, unless it is mostly a constant. The trim alone may be off by one of them.
+    An error of the aircraft's forces shows in several; a small one may exceed the limit of one
+    alone, unless it is mostly a constant. The trim alone may be off by a force.
     """
     judged = [one for one in outputs if one.stage == FLOWN and one.channel != TRIM]
     clear = {one.channel for one in judged if one.gap(rig) <= one.limit}
@@ -295,8 +294,8 @@ def signals(
     """Return the signals compared with an output's residual, by name with unit, if recorded.
 
     They are those of the output's stage, or of another `stage`. `left` is the residual in floors.
-    If motion is imposed, the force is the output: its prediction replaces the measurement, which
-    contains the residual that is to be explained.
+    If motion is imposed, the predicted force replaces the measured one, which contains the
+    residual that is to be explained.
     """
     d, rate_Hz = unit_of(control), output.frame_rate_Hz
     names = {
@@ -392,7 +391,7 @@ Mask = NDArray[np.bool_]
 class InTime:
     """The share of the windows in which a residual is loud, and its onset and end.
 
-    Onset or end, in s from the record's start, is None if the excitation can explain it.
+    These, in s from the record's start, are None if the excitation can explain them.
     """
 
     loud: float

@@ -101,10 +101,7 @@ class Beam:
         self.screen = Screen(self.problem, self.error)
 
     def add(self, fitted: Fit) -> bool:
-        """Add a fit; of two fits of a set keep the admissible one, then that of higher evidence.
-
-        Return whether it is kept.
-        """
+        """Add a fit, unless its set has an admissible or likelier one; return if it is added."""
         names = names_of(fitted.effects)
         new = evidence(self.problem, fitted, self.error)
 
@@ -143,10 +140,9 @@ class Beam:
     def _needed(self, fitted: Fit, valid: Sequence[Names]) -> Names:
         """Return the effects of a set that no simpler admissible set can do without.
 
-        The interval by slopes of such an effect may contain the neutral value where dry friction
-        makes the residual discontinuous; the evidence is then the better test. It must be very much
-        higher than that of each set of fewer parameters without the effect, and without a law that
-        contains it.
+        With dry friction the residual is discontinuous, and an interval by slopes may contain the
+        neutral value of such an effect. The evidence must then be very much higher than that of
+        each set of fewer parameters without the effect, and without a law that contains it.
         """
         if not len(self.counts):
             return frozenset()
@@ -180,8 +176,8 @@ class Beam:
     def worth(self, fitted: Fit, share: float = 1.0) -> Worth:
         """Return the predicted gain that one effect more needs to make a set the best one.
 
-        The gain must exceed the log prior of an effect and a `share` of the evidence by which the
-        set is behind the best one: a prediction may show half of a gain.
+        It must exceed the log prior of an effect and a `share` of the evidence by which the set is
+        behind the best one: a prediction may show half of a gain.
         """
         return Worth(PRIOR_EFFECT + share * self.behind(fitted), self.counts)
 
@@ -221,8 +217,8 @@ def names_of(effects: Iterable[Effect]) -> Names:
 def is_admissible(problem: Problem, fitted: Fit, needed: Names = frozenset()) -> bool:
     """Tell whether a fit is admissible.
 
-    The interval of each effect's size excludes the neutral value, unless the effect is `needed`, no
-    parameter is at a bound, and no frequency may be above the Nyquist frequency.
+    The interval of each effect's size, unless the effect is `needed`, excludes the neutral value;
+    no parameter is at a bound, and no frequency may be above the Nyquist frequency.
     """
     fastest = 0.5 * min(output.frame_rate_Hz for output in problem.outputs)
     for effect in fitted.effects:
@@ -301,10 +297,9 @@ def _search_by_depth(beam: Beam, library: Sequence[Effect]) -> tuple[dict[str, f
 def _fit_neighbours_of_best(beam: Beam, library: Sequence[Effect]) -> None:
     """Fit the sets with one effect less than the best set, and with a nested law in its place.
 
-    A set with one effect less starts at the optimum of the best set, also if it is known: its first
-    fit may have ended at a local minimum. A law of several parameters may be equivalent to two
-    effects of fewer parameters, so they are fitted as well. Repeat with each new best set. The best
-    set may be that of an earlier round again, since the effective samples change with the sets.
+    A set with one effect less starts at the best set's optimum, also if it is known: its first fit
+    may have ended at a local minimum. A law of several parameters may be equivalent to two effects
+    of fewer. Repeat with each new best set, which may be an earlier one: the samples change.
     """
     done = set[Names]()
     while beam.best and beam.best not in done:
@@ -333,8 +328,7 @@ def _numbers(fitted: Fit) -> int:
 def _fit_with_simpler_law(beam: Beam, law: Effect) -> Fit | None:
     """Return the best fit with an effect of fewer parameters in place of a law of the best set.
 
-    Both show in the same output. Return None if the law has a single parameter, if there is no such
-    effect, or if its neighbours are fitted.
+    Both show in the same output. Return None if there is none, or if its neighbours are fitted.
     """
     rest = beam.best - {law.name}
     for names in beam.ranked() if len(law.free) > 1 else ():
@@ -353,8 +347,7 @@ def _fit_neighbours(beam: Beam, fitted: Fit, library: Sequence[Effect], wanted: 
     are fitted only if they may do better; otherwise all are, since a prediction may show a small
     part of a large gain. If none is worth a fit beside the best set, a few are fitted all the same:
     the gain of a law whose shape is far from that of its start cannot be predicted. A law that
-    contains another law is fitted after it, from its optimum, if the best set leaves an output
-    unexplained. Laws of dry friction start from presliding parameters that were fitted before.
+    contains another is fitted after it, from its optimum, if an output is still unexplained.
     """
     found, is_best = fitted, names_of(fitted.effects) == beam.best
     beside = _candidates(found.effects, library, wanted)
@@ -454,10 +447,7 @@ def _candidates(
 
 
 def _starts_with_one_more(beam: Beam, fitted: Fit, one: Screened) -> list[Try]:
-    """Return the starts of a set with one effect more.
-
-    New dry friction starts at the presliding parameters fitted before (`Beam.contact`).
-    """
+    """Return the starts of a set with one effect more, new dry friction at `Beam.contact`."""
     effects = (*fitted.effects, one.effect)
     values = {**(beam.contact if one.effect.dry else {}), **fitted.values}
     return [(effects, values | start, fitted) for start in one.starts]
@@ -502,10 +492,7 @@ def _sets_with_other_law(beam: Beam, fitted: Fit, library: Sequence[Effect]) -> 
 
 
 def _starts_with_other_law(beam: Beam, fitted: Fit, old: Effect, law: Effect) -> list[Try]:
-    """Return the start of a law in place of a fitted law.
-
-    Common parameters start at their fitted values. None if neither law contains the other.
-    """
+    """Return the start of a law in place of one that it contains or that contains it; else none."""
     rest = tuple(effect for effect in fitted.effects if effect is not old)
     wider = contains(law, old)
     if not (wider or contains(old, law)) or keys_of(rest) & keys_of([law]):
@@ -529,11 +516,10 @@ def _starts_with_other_law(beam: Beam, fitted: Fit, old: Effect, law: Effect) ->
 def _fit_sets(beam: Beam, tries: Sequence[Try]) -> list[Fit]:
     """Fit sets from their starts, add them, and return the best fit of each set.
 
-    All starts are fitted for a few evaluations, which need not reach the optimum. A start goes on
-    if it is near the best one, or made at least half of its gain over the parent. A start of a law
-    goes on too if its evidence is below that of a contained law: the optimum of the wider law is at
-    least as good. The best start of each set is then fitted to convergence; a further start only if
-    the best one leaves an output over its limit.
+    All starts are fitted for a few evaluations. A start goes on if it is near the best one, if it
+    made at least half of its gain over the parent, or if its law is less likely than a contained
+    one: the optimum of the wider law is at least as good. The best start of each set is then fitted
+    to convergence; a further start only if the best one leaves an output over its limit.
     """
     problem = beam.problem
     unique: dict[tuple[Names, tuple[tuple[str, float], ...]], Try] = {}
@@ -618,9 +604,9 @@ def _choose(beam: Beam, rounds: tuple[dict[str, float], ...]) -> Choice:
     """Return the best set with each effect's posterior probability and its alternatives.
 
     The probability of an effect is the sum over the sets with it, or with a law that contains it.
-    Where every output is within its noise, no effect is the answer unless its evidence is far
-    behind that of a set of functions of the model, which a user asks for, and which leaves every
-    output within its noise: noise that is not quite as modelled is explained by some effect.
+    If all outputs are within their noise, the answer is no effect: noise that is not quite as
+    modelled is explained by some effect. Functions of the model, which a user asks for, are the
+    answer if their evidence is far ahead and all outputs are within their noise with them.
     """
     ranked = beam.ranked()
     logs = np.array([beam.log(names) for names in ranked])
@@ -671,10 +657,7 @@ def _determined(beam: Beam, ranked: Sequence[Names]) -> Names:
 
 
 def _replaces(best: Names, other: Names, effect: Effect) -> bool:
-    """Tell whether another set replaces an effect of the best set.
-
-    One effect replaces one or several, or several replace one.
-    """
+    """Tell whether another set replaces an effect of the best set, one by several or vice versa."""
     gone, new = best - other, other - best
     return effect.name in gone and len(new) >= 1 and min(len(gone), len(new)) == 1
 
@@ -682,9 +665,9 @@ def _replaces(best: Names, other: Names, effect: Effect) -> bool:
 def _name_law_with_contact(beam: Beam, choice: Choice, library: Sequence[Effect]) -> Choice:
     """Return a choice with presliding friction named, if its presliding length is not zero.
 
-    Presliding parameters are nuisance parameters in the search (`distinct`). If the rig file has no
-    friction, and the 95 % interval of the presliding length excludes a rigid contact, for which the
-    shortest length stands, the law that includes these parameters replaces the law found.
+    In the search its parameters are nuisance parameters (`distinct`). The law with them is named if
+    the rig file has no friction, and the length's 95 % interval excludes the shortest, which is
+    that of a rigid contact.
     """
     problem, fitted = beam.problem, choice.fit
     case = problem.case

@@ -134,8 +134,8 @@ class Case:
     def is_comparable(self, effect: Effect) -> bool:
         """Tell whether a fit without an effect may use the tolerance of the effect's value, if any.
 
-        The nuisance parameter of a value is fitted only if one of its outputs exceeds the noise.
-        Otherwise the effect would be credited with what the tolerance explains.
+        A nuisance parameter is fitted only if one of its outputs exceeds the noise. Otherwise the
+        effect would be credited with what the tolerance explains.
         """
         return effect.name not in self.known or effect.name in self.settings
 
@@ -166,17 +166,11 @@ class Case:
         every = (*self.known.values(), *self.contact)
         return {one.value_key(p): p.starts[0] for one in every for p in one.free}
 
-    def ends(self, effect: Effect) -> tuple[float, float] | None:
-        """Return the tolerance limits of an effect's number; None if it has no tolerance."""
-        setting = self.known.get(effect.name)
-        return None if setting is None else (setting.free[0].low, setting.free[0].high)
-
     def gaps(self, rig: Rig) -> dict[str, float]:
         """Return each stage's gap, with the higher of the noise floors of the nominal and this rig.
 
-        A rig with presliding friction, for example, passes noise that rigid friction would hold. If
-        the aircraft differs from the nominal one, its trim positions of the surfaces differ too,
-        and the smaller of the two gaps counts.
+        Presliding friction, for example, passes noise that rigid friction would hold. If the
+        aircraft differs from the nominal one, its trim positions do too: the smaller gap counts.
         """
         gaps, limits = stage_gaps(self.outputs, rig), stage_limits(self.outputs)
         narrow = all(gap <= limits[stage] for stage, gap in gaps.items())
@@ -196,9 +190,8 @@ class Case:
     def without_colour_allowance(self, root: Rig) -> Case:
         """Return the case without the allowance for unknown noise colour, where there is a gap.
 
-        The colour of the input noise is uncertain, and this raises the limit of a stage (`unsure`).
-        The allowance decides only whether a stage has a gap. A gap over the raised limit with the
-        `root` rig, without effects, is then judged by the plain limit.
+        The allowance (`unsure`) decides only whether a stage has a gap with the `root` rig, without
+        effects; a stage that has one is judged by the plain limit.
         """
         if not any(output.unsure for output in self.outputs):
             return self
@@ -212,8 +205,7 @@ class Case:
     def with_lower_noise(self, rig: Rig) -> Case | None:
         """Return the case with noise estimated from a rig's residuals; None if none is lower.
 
-        The noise does not depend on the rig, and a gap raises its estimate. The lowest estimate of
-        any rig is therefore the best.
+        A gap raises the estimate of the noise, so the lowest of all rigs is the best.
         """
         if self.outputs_with_noise_of is None:
             return None
@@ -262,9 +254,9 @@ class Case:
         return self.nominal if rig is None else rig
 
     def actions(self, found: Fit, effect: Effect) -> list[tuple[Output, Floats, Floats]]:
-        """Return the outputs on which an effect of a fit acts, with its action and the residual.
+        """Return the outputs on which an effect of a fit acts, its action and the residual.
 
-        Both in noise floors: the residual is with all effects, the action what it is less without.
+        Both in noise floors. The residual is with all effects; without this one the action adds.
         """
         without = self.with_only(found, [other for other in found.effects if other is not effect])
         lefts = ((one, one.residual(found.rig)) for one in touched(self.outputs, [effect]))
@@ -299,6 +291,6 @@ class Case:
 def _has_lower_noise(new: Output, old: Output) -> bool:
     """Tell whether an output's noise estimate is lower with another rig, for the same measurement.
 
-    A measured trim position of the elevator depends on the rig; then the measurements differ.
+    The measured trim position of the elevator depends on the rig.
     """
     return new.own < (1.0 - LESSER) * old.own and np.array_equal(new.measured, old.measured)

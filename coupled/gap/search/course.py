@@ -66,10 +66,9 @@ class Bounds(Plain):
 class Course:
     """The time history of an effect.
 
-    `onset_s` is the time from the record's start, None if the effect acts from the start.
-    `rate_per_s` is the rate of change of the effect's first parameter, in its unit per second, or
-    the rate of events, 1/s; None if constant. `then` is the size from the onset on, relative to the
-    size in the whole record.
+    `onset_s` is the time from the record's start, None if the effect acts from the start;
+    `rate_per_s` the rate of change of its first parameter, a second, or of events, 1/s; `then` the
+    size from the onset on, relative to that in the whole record.
     """
 
     kind: Kind
@@ -110,9 +109,8 @@ def course_of(
 ) -> Course:
     """Return the time history of an effect in one record.
 
-    `parts` are the effect's action and the residual of each output, in noise floors, over the
-    frames. `value` is the effect's first parameter less its neutral value. It is a rate if
-    `gradual`.
+    `parts` are its action and the residual of each output, in noise floors, by frame. `value` is
+    its first parameter less the neutral value, a rate if `gradual`.
     """
     sizes, weights, times_s = _sizes(parts, rate_Hz)
     plain = Course("grows" if gradual else "constant", rate_per_s=value if gradual else None)
@@ -164,10 +162,7 @@ def course_of_events(at_s: Floats, lasted_s: float) -> Course:
 
 
 def _sizes(parts: Sequence[tuple[Floats, Floats]], rate_Hz: float) -> tuple[Floats, Floats, Floats]:
-    """Return sizes, weights and times, s, of the windows in which the effect acts.
-
-    A window's time is the centroid of its action.
-    """
+    """Return sizes, weights and times, s, of the action's centroid, of the windows with action."""
     frames = max(1, round(WINDOW_s * rate_Hz))
     count = min(len(action) for action, _ in parts) // frames
     power, along, at = np.zeros(count), np.zeros(count), np.zeros(count)
@@ -224,10 +219,7 @@ def _near(one: _Law, best: _Law, count: float) -> bool:
 
 @dataclass(frozen=True)
 class Timing:
-    """The relative size of an effect over time, at most 1: a step at `onset_s`, or a ramp from it.
-
-    It is a ramp if it `grows`.
-    """
+    """The relative size of an effect over time: a step to 1 at `onset_s`, or a ramp from it."""
 
     onset_s: float
     grows: bool
@@ -241,7 +233,7 @@ class Timing:
         return np.asarray(grown / max(float(grown.max()), 1e-300))
 
     def course(self, seen: Bounds, lasted_s: float, value: Bounds) -> Course:
-        """Return the time history of an effect fitted with this timing; `seen` is its onset, s.
+        """Return the time history of an effect with this timing; `seen` is its onset, s.
 
         `value` is the largest value of the effect's first parameter, less its neutral value.
         """

@@ -17,7 +17,7 @@ for all derivatives. The second phase minimises the residual at the loader's own
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, Literal
 
@@ -52,9 +52,9 @@ Ends = tuple[Floats, Floats]
 
 @dataclass(frozen=True)
 class Slope:
-    """The residual of all frames and its Jacobian, at the scaled parameters `at`.
+    """The residual of all frames, in noise floors, and its Jacobian, at scaled parameters `at`.
 
-    `residual` has shape (frames,), in noise floors, `jacobian` (frames, parameters).
+    The Jacobian has shape (frames, parameters).
     """
 
     at: Floats
@@ -72,8 +72,8 @@ class Slopes:
     Friction, breakout and play make the residual jump by small amounts: a difference over less is
     no derivative of the fit's cost. Far from the optimum the jumps are larger, and a step changes
     the residual by at least a `share` of it. A `smooth` residual has no jumps, and its steps do not
-    grow. `last` is the last Jacobian, possibly of another fit of the same parameters to the same
-    frames. Columns of `held` without NaN are reused, shape (frames, parameters).
+    grow. `last` is the last Jacobian, possibly of another fit of the same parameters and frames.
+    Columns of `held` without NaN are reused, shape (frames, parameters).
     """
 
     def __init__(
@@ -146,18 +146,20 @@ def _rms(values: Floats) -> float:
 
 
 @dataclass(frozen=True)
-class Reached:
-    """The result of a descent: parameters, residual, Jacobian and residual evaluations.
+class End:
+    """The result of least squares: scaled parameters, residual and Jacobian.
 
     `cost` is half the residual's sum of squares. `rejected`: the last steps did not decrease it.
+    `slope` is the Jacobian, if kept for another fit.
     """
 
     x: Floats
     cost: float
     fun: Floats
     jac: Floats
-    evaluations: int
-    rejected: bool
+    evaluations: int = 0
+    rejected: bool = False
+    slope: Slope | None = None
 
 
 def descend(
@@ -167,12 +169,12 @@ def descend(
     ends: tuple[Floats, Floats],
     most: int,
     enough: Callable[[Floats], float],
-) -> Reached:
+) -> End:
     """Minimise half a residual's sum of squares from the first parameters, between bounds `ends`.
 
-    `residual` returns shape (frames,), `slopes` its Jacobian, (frames, parameters). At most `most`
-    residuals are evaluated. `enough` returns the relative decrease of the cost by the residual; the
-    descent ends at a smaller predicted decrease.
+    `residual` returns shape (frames,), `slopes` its Jacobian. At most `most` residuals are
+    evaluated. The descent ends where the predicted relative decrease is less than `enough` of the
+    residual.
     """
     x = np.clip(first, *ends)
     current, jacobian = residual(x), slopes(x)
@@ -206,7 +208,7 @@ def descend(
         reach, rejected = 2.0 * reach if gain > (1.0 - PARTLY) else reach, 0
         if little:
             break
-    return Reached(x, cost, current, jacobian, evaluations, rejected > 0)
+    return End(x, cost, current, jacobian, evaluations, rejected > 0)
 
 
 def _step(
@@ -219,7 +221,7 @@ def _step(
 ) -> tuple[Floats, float]:
     """Return a damped step between the bounds, and the predicted decrease of the cost.
 
-    The Jacobian is reduced by a QR factorisation, so that the bounded problem is small.
+    A QR factorisation makes the bounded problem small.
     """
     base, triangle = np.linalg.qr(jacobian)
     against = base.T @ current
@@ -230,20 +232,6 @@ def _step(
     step = lsq_linear(rows, wanted, room, method="bvls").x / sizes
     after = triangle @ step + against
     return step, 0.5 * float(against @ against - after @ after)
-
-
-@dataclass(frozen=True)
-class End:
-    """The result of least squares: scaled parameters, residual and Jacobian.
-
-    `cost` is half the residual's sum of squares, `slope` the Jacobian, if kept.
-    """
-
-    x: Floats
-    cost: float
-    fun: Floats
-    jac: Floats
-    slope: Slope | None
 
 
 @dataclass(frozen=True)
@@ -321,8 +309,8 @@ def leaves_noise(cost: float, frames: int) -> bool:
 class _Search:
     """Least squares, with derivatives of a residual that may be approximate."""
 
-    residual: Any
-    sloping: Any
+    residual: Callable[[Floats], Floats]
+    sloping: Callable[[Floats], Floats]
     ends: Ends
     share: float = 0.0
     smooth: bool = False
@@ -344,11 +332,8 @@ class _Search:
             times = min(memory(left), FEWER) if self.dry else 1.0
             return LESSER * times / 1000
 
-        def left(x: Floats) -> Floats:
-            return np.asarray(self.residual(x))
-
         while True:
-            found = descend(left, slopes, x0, self.ends, most, enough)
+            found = descend(self.residual, slopes, x0, self.ends, most, enough)
             most -= found.evaluations
             misled = found.rejected and slopes.corrections > 0
             if (slopes.sure and not misled) or most < 1:
@@ -356,4 +341,4 @@ class _Search:
             slopes.last = None  # so that differences are taken next
             x0 = found.x
         known = None if slopes.last is None or misled else slopes.last.kept()
-        return End(found.x, found.cost, found.fun, found.jac, known)
+        return replace(found, slope=known)

@@ -63,26 +63,25 @@ def fit_set(
     A fit starts from each parameter's own starts, or from its value in `start`, and the best
     minimum is kept. Effects that share no output are fitted separately. Groups of `parent` that are
     the same, and start at their optimum, are reused. If the values give no valid rig, all
-    parameters are at a bound.
-    `priors` are (mean, standard deviation) by "effect.parameter", in the parameters' own units.
+    parameters are at a bound. `priors` are by "effect.parameter", in the parameters' units.
     """
     every = [*effects, *nuisances]
     values: dict[str, float] = {}
     low: dict[str, float] = {}
     high: dict[str, float] = {}
     bound: tuple[str, ...] = ()
-    cost, groups = 0.0, dict[tuple[Effect, ...], Group]()
+    groups: dict[tuple[Effect, ...], Group] = {}
     for members in grouped(every):
         known = None if parent is None else parent.groups.get(tuple(members))
         if known is None or any(start.get(key, at) != at for key, at in known.values.items()):
             known = _remembered(case, members, priors, start, descent, parent, part)
         groups[tuple(members)] = known
         low, high, bound = low | known.low, high | known.high, bound + known.at_bound
-        values, cost = values | known.values, cost + known.cost
+        values |= known.values
     rig = possible(case.nominal, case.control, every, values)
     if rig is None:
         rig, bound = case.nominal, tuple(values)
-    return Fit(tuple(effects), values, low, high, bound, rig, cost, groups=groups)
+    return Fit(tuple(effects), values, low, high, bound, rig, groups)
 
 
 def fit_alone(
@@ -123,7 +122,7 @@ def _remembered(
 ) -> Group:
     """Return a fit from the cache; a fit that starts at the optimum of another one is that fit.
 
-    It has no large Jacobians; that of a fit that ended here is in `descent`.
+    Large Jacobians are not cached; that of a fit that ended here is in `descent`.
     """
     ours, known = touched(case.outputs, members), descent.known
     if descent.most < WHOLE.most and parent is not None:
@@ -144,10 +143,7 @@ def _remembered(
 
 
 def _held(case: Case, ours: Sequence[Output], keys: Sequence[str], parent: Fit) -> Floats | None:
-    """Return the Jacobian of a parent's fit, NaN in the columns of parameters that it lacks.
-
-    Its shape is (frames, parameters). Return None if the parent has none of the parameters.
-    """
+    """Return a parent's Jacobian, NaN in columns that it lacks; None if it lacks all."""
     edges = np.cumsum([0, *(len(output.measured) for output in ours)]).tolist()
     rows = {id(one): slice(*ends) for one, ends in zip(ours, pairwise(edges), strict=True)}
     found = np.full((edges[-1], len(keys)), np.nan)
@@ -179,9 +175,9 @@ def _fit(
     """Return a fit; repeat a fit at the loader's own steps until its weights are consistent."""
     nominal, control = case.nominal, case.control
     keys, frees = _free(effects)
-    if not ours:
+    if not ours or not keys:
         known = dict(zip(keys, _starts(effects, start)[0], strict=True))
-        return Group(known, {}, {}, (), 0.0, np.zeros((len(keys), len(keys))))
+        return Group(known, {}, {}, (), np.zeros((len(keys), len(keys))))
     scale = np.array([_scale(p) for p in frees])
     frames = [int(np.count_nonzero(output.rows(part))) for output in ours]
 
@@ -202,9 +198,6 @@ def _fit(
         lefts = zip(plain(scaled, coarse, rough), weights, strict=True)
         return np.concatenate([weight * left for left, weight in lefts])
 
-    if not keys:
-        left = residual(np.array([]))
-        return Group({}, {}, {}, (), 0.5 * float(left @ left), np.zeros((0, 0)))
     ends = np.array([p.bounds(nominal, control) for p in frees]).T
     low, high = ends / scale
     stepped = any(output.stepped for output in ours)
@@ -305,8 +298,8 @@ def _group(
 ) -> Group:
     """Return the values of a converged fit, with their intervals, and which are at a bound.
 
-    `stretches` is the stretch number of each row, `cost` the cost with one parameter changed,
-    `errors` samples of the inputs' error, shape (samples, rows).
+    `stretches` are by row, `cost` is that with one parameter changed, `errors` are samples of the
+    inputs' error, shape (samples, rows).
     """
     (low, high), scale = free.ends / free.scale, free.scale
     half = half_width(best, free.frames, stretches, prior.precision, errors) * scale
@@ -336,7 +329,6 @@ def _group(
         dict(zip(free.keys, lower.tolist(), strict=True)),
         dict(zip(free.keys, upper.tolist(), strict=True)),
         tuple(key for key, at in zip(free.keys, stuck, strict=True) if at),
-        best.cost,
         _information(best, free) / np.outer(scale, scale),
         prior.penalty(best.x),
         best.slope,
@@ -381,8 +373,8 @@ def _with_slopes(
 def _with_trim(end: End, free: _Free) -> Floats | None:
     """Return the parameters with which the model trims as the records do; None if it does.
 
-    Beyond the trim's error a flight is moved to the model's own trim (`openloop`), and the cost has
-    another minimum there. Of all parameters with the record's trim, to first order, these increase
+    A flight beyond the trim's error is moved to the model's own trim (`openloop`), so that the cost
+    has another minimum. Of the parameters with the record's trim, to first order, these increase
     the cost least.
     """
     trims = [rows for output, rows, _ in free.parts() if output.channel == TRIM]

@@ -23,17 +23,15 @@ from coupled.rig.rig import Rig
 class Group:
     """The fit of effects that share outputs: values and 95 % interval by "effect.parameter".
 
-    `cost` is half the weighted sum of squares in noise floors, without the priors. `information` is
-    that of the log-likelihood, in the parameters' own units, without the priors. `penalty` is the
-    log density of the nuisance parameters below its maximum. `slope` is that of the outputs that
-    it touches, in noise floors.
+    `information` is that of the log-likelihood, in the parameters' units, without priors. `penalty`
+    is the log density of the nuisance parameters below its maximum, `slope` the Jacobian in noise
+    floors.
     """
 
     values: dict[str, float]
     low: dict[str, float]
     high: dict[str, float]
     at_bound: tuple[str, ...]
-    cost: float
     information: Floats
     penalty: float = 0.0
     slope: Slope | None = field(default=None, repr=False, compare=False)
@@ -43,8 +41,8 @@ class Group:
 class Fit:
     """A fitted set of effects: `values`, `low`, `high` (95 %) by "effect.parameter".
 
-    `at_bound` are the parameters at a bound, or undetermined; `cost` is half the weighted sum of
-    squares, in noise floors. `groups` are the parts that share no output.
+    `at_bound` are the parameters at a bound, or undetermined, `groups` the parts that share no
+    output.
     """
 
     effects: tuple[Effect, ...]
@@ -53,7 +51,6 @@ class Fit:
     high: Mapping[str, float]
     at_bound: tuple[str, ...]
     rig: Rig
-    cost: float
     groups: Mapping[tuple[Effect, ...], Group] = field(default_factory=dict, compare=False)
 
 
@@ -84,9 +81,9 @@ class Found:
 class Choice:
     """The effects of the best set, and their fit.
 
-    `without_effects` is the fit of the nuisance parameters alone, within their tolerance. `tried`
-    is the gain in log evidence of each effect alone, `rounds` that of each depth's sets by the
-    effect added, `probability` the posterior probability of the best set.
+    `without_effects` is the fit of the nuisance parameters alone, within their tolerance; `tried`
+    the gain in log evidence of each effect alone, `rounds` that of each depth's sets by the effect
+    added, `probability` the posterior probability of the best set.
     """
 
     steps: tuple[Found, ...]
@@ -129,8 +126,7 @@ class Alike:
 def alike(group: Group) -> list[Alike]:
     """Return the numbers that were fitted together, and that records determine only together.
 
-    By the small eigenvalues of the signatures' cosines: where each number may be moved as far as
-    the others make good again.
+    They are in the directions of small eigenvalues of the signatures' cosines.
     """
     size = np.sqrt(np.diag(group.information))
     moved = size > 0.0

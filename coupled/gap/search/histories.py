@@ -37,8 +37,8 @@ def _search_with_onset(
 ) -> tuple[Case, Choice] | None:
     """Repeat the search with an effect that begins within the record, if that explains far more.
 
-    Other effects of the set may only compensate for the missing time history. An effect that grows
-    late may gain nothing as a constant: if no effect was found, the best single effects are tried.
+    Other effects of the set may compensate for the missing time history. If no effect was found,
+    the best single ones are tried: one that grows late may gain nothing as a constant.
     """
     open_outputs = _open_outputs(case, found)
     gains = {step.effect.name: step.gain for step in found.steps} or found.tried
@@ -70,8 +70,8 @@ def _left(case: Case, choice: Choice) -> float:
 def course_in(effect: Effect, case: Case, found: Fit, records: list[Record]) -> Course | None:
     """Return the time history of an effect in the record with most of its action.
 
-    Return None for a discrete effect, for a limit, whose action is not proportional to its size,
-    and for an effect without action.
+    None for a discrete effect, for a limit, whose action is not proportional to its size, and
+    without action.
     """
     if not effect.free:
         return None
@@ -95,8 +95,8 @@ def course_in(effect: Effect, case: Case, found: Fit, records: list[Record]) -> 
 def in_time(effect: Effect, case: Case) -> Case | None:
     """Return the case with the time history of an effect that begins within the one record.
 
-    None if the effect acts from the start, or has no size. The effect is fitted alone, since other
-    effects may have absorbed the error of a constant size.
+    None if the effect acts from the start, or has no size. It is fitted alone, since other effects
+    may have absorbed the error of a constant size.
     """
     number = effect.free[0] if effect.free else None
     sized = number is not None and not number.is_limit and not effect.gradual

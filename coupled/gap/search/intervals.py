@@ -30,10 +30,8 @@ def half_width(
 ) -> Floats:
     """Return half of each scaled parameter's 95 % interval; infinite if it is undetermined.
 
-    The largest of three: from the residual's variance and correlation time, from the sandwich
-    estimator, and from samples of the input's error, `errors`, shape (samples, rows). `frames` are
-    the outputs' numbers of rows, `groups` the stretch numbers of the rows, and `known` the
-    1/variance of the priors.
+    `frames` are the outputs' numbers of rows, `groups` the stretch numbers of the rows, `known` the
+    1/variance of the priors, `errors` samples of the input's error, shape (samples, rows).
     """
     jacobian, left = found.jac, found.fun
     variance, unit, widen = _counted(left, frames)
@@ -63,10 +61,9 @@ def open_above(
 ) -> tuple[float, float] | None:
     """Return the least value as likely as the fitted one, and the lower limit of its interval.
 
-    Return None unless every larger value, up to the upper of the `ends`, is as likely, and the
-    lower end is not. For example, a play wider than the motion absorbs all of it, and the data do
-    not determine its width. `cost` is half a sum of squares, `worth` the cost of one unit of
-    log-likelihood.
+    None unless every larger value, up to the upper of the `ends`, is as likely, and the lower end
+    is not: as of a play wider than the motion, whose width the data do not determine. `cost` is
+    half a sum of squares, `worth` the cost of one unit of log-likelihood.
     """
     least, most = ends
     margin = 0.5 * float(chdtri(1.0, 0.05)) * worth  # χ² of one number, 95 %
@@ -105,8 +102,8 @@ def _counted(left: Floats, frames: Sequence[int]) -> tuple[float, float, float]:
 def cut(groups: Numbers, numbers: int, memories: float) -> Numbers:
     """Return each frame's stretch number, with stretches divided if there are too few of them.
 
-    `numbers` is the number of parameters, `memories` the correlation time, frames. A part lasts at
-    least `LEAST_MEMORIES` correlation times, and is the same in every output.
+    A part lasts at least `LEAST_MEMORIES` correlation times (`memories`, frames), and is the same
+    in every output. `numbers` is the number of parameters.
     """
     begins = np.flatnonzero(np.diff(groups, prepend=groups[0] - 1))
     lengths = np.diff(np.append(begins, len(groups)))

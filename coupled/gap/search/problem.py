@@ -34,8 +34,8 @@ class Prior(NamedTuple):
 class ModelError:
     """The error of a correct effect's physics in each output, beside noise of variance 1.
 
-    `power` is its variance in noise floors², `samples` its effective samples, those of the residual
-    of which it is a share. Both have the shape (outputs,).
+    `power` is its variance in noise floors², `samples` the effective samples of the residual of
+    which it is a share, shape (outputs,) each.
     """
 
     power: Floats
@@ -47,10 +47,7 @@ class ModelError:
         return np.asarray(1.0 + self.power)
 
     def smooth(self, noise: Floats) -> Floats:
-        """Return the autocorrelation time of noise over that of noise and model error together.
-
-        `noise` are the effective samples of the noise alone.
-        """
+        """Return the autocorrelation time of noise, of `noise` samples, over that of both."""
         return np.asarray(self.variance / (1.0 + self.power * noise / self.samples))
 
     def of(self, index: Sequence[int]) -> ModelError:
@@ -60,10 +57,7 @@ class ModelError:
 
 @dataclass(frozen=True)
 class Problem:
-    """A case whose nuisance parameters have Gaussian priors.
-
-    The tolerance of a value in the rig file is the 95 % interval of its prior.
-    """
+    """A case with Gaussian priors of nuisance parameters: tolerances are 95 % intervals."""
 
     case: Case
     _known: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
@@ -91,8 +85,8 @@ class Problem:
     def beside(self, effects: Sequence[Effect]) -> list[Effect]:
         """Return the nuisance parameters of a set: those that no effect of the set frees.
 
-        Presliding parameters are included if the set has dry friction. They are also included if
-        the rig file has dry friction and the loader's residual exceeds the noise.
+        Presliding parameters are included if the set has dry friction, or if the rig file has it
+        and the loader's residual exceeds the noise.
         """
         freed = {p.key for effect in effects for p in effect.parameters}
         free = list(self.nuisances)
@@ -168,10 +162,7 @@ class Problem:
         return None if short is None else Problem(short)
 
     def model_error(self, without: Rig) -> ModelError:
-        """Return the model error of each output: a share of the residual of a rig without effects.
-
-        Outputs of exact laws (`EXACT`) have none.
-        """
+        """Return each output's model error, a share of its residual without effects."""
         gaps = np.array([output.gap(without) for output in self.outputs])
         share = np.array([0.0 if one.stage in EXACT else MISMATCH for one in self.outputs])
         samples = np.array([output.samples(output.residual(without)) for output in self.outputs])
