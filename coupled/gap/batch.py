@@ -52,8 +52,7 @@ class Job:
 def jobs(folder: Path, out: Path, control: ControlName | None = None) -> list[Job]:
     """Return what a folder's `records.toml` asks for: record = rig.
 
-    Records lie beside it or in `records/`, rigs in `rigs/` there or a folder up, else among
-    the shipped ones.
+    Records lie beside it or in `records/`, rigs in `rigs/` there or a folder up, or are shipped.
     """
     listed = load_toml(folder / LIST)
     if not listed:
@@ -163,10 +162,7 @@ def made_by(job: Job) -> dict[str, str]:
 
 
 def known_row(job: Job, made: Mapping[str, str]) -> Row | None:
-    """Return the row of an existing diagnosis that was made with the same inputs and version.
-
-    None where there is none, and where the file is damaged: the diagnosis is then made again.
-    """
+    """Return the row of an undamaged diagnosis by the same inputs and version; else None."""
     try:
         known = read_json(job.out, "a diagnosis is wanted")
         row = Row.of(known, job)
@@ -180,8 +176,8 @@ def answer(
 ) -> tuple[int, str, dict[str, Any]]:
     """Return a job's number, the version that did it, and the JSON of the diagnosis.
 
-    Needs no file, so that any machine can do it. A diagnosis that is refused, or fails, has a
-    verdict that says so, and why.
+    Needs no file, so that any machine can do it. The verdict of a diagnosis that is refused, or
+    fails, says so.
     """
     try:
         document = diagnose(rig, {name: record}, control, workers=1).as_dict()
@@ -203,8 +199,8 @@ def _nothing(error: Exception) -> dict[str, Any]:
 def run_all(todo: list[Job], progress: Progress, workers: int = 0, cluster: str = "") -> list[Row]:
     """Diagnose all records on all cores, or a dask cluster; the numbers are those of one core.
 
-    Each diagnosis is written here as soon as it is made. Raises InputError, and where a
-    cluster's workers have another version of this package.
+    Each diagnosis is written here as soon as it is made. Raises InputError, also if a cluster's
+    workers have another version of this package.
     """
     found: dict[int, Row] = {}
     made = {number: made_by(job) for number, job in enumerate(todo)}

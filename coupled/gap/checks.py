@@ -54,6 +54,7 @@ from coupled.record.channels import (
     TIME,
     ControlName,
     channel,
+    motions_in,
 )
 from coupled.record.importing import plausible
 from coupled.record.importing.account import log_rate_of
@@ -106,7 +107,7 @@ def check_record(
 def check_units(rig: Rig, record: Record, control: ControlName, file: object) -> None:
     """Raise InputError if a channel has another unit or sign, by channels that determine it.
 
-    Before the trim is taken from the record, since a speed in knots has none.
+    Checked before the trim is taken from the record, since a speed in knots has none.
     """
     columns = _columns(record)
     found = other_units(columns, rig)
@@ -206,9 +207,9 @@ def check_against_model(
 ) -> None:
     """Raise InputError if a surface, or the pitch or roll rate, moves against the model's.
 
-    No effect of the library reverses these. Errors of the model may reverse the yaw rate, by
-    adverse yaw, and slow changes of speed or height. A surface is an input of the model's flight,
-    so a reversed one reverses the model's rate: the attitude shows which of the two is right.
+    No effect of the library reverses these; adverse yaw may reverse the yaw rate. A surface is an
+    input of the model's flight, so a reversed one reverses the model's rate: the attitude shows
+    which of the two is right.
     """
     signed = (*map(surface_channel, CONTROL_NAMES), RATE["column"], RATE["wheel"])
     for output in outputs:
@@ -228,8 +229,8 @@ def check_against_model(
 def _surface_is_reversed(rig: Rig, record: Record, control: ControlName) -> bool:
     """Tell whether a rate against the model's is due to its surface, not to its own sign.
 
-    So it is if the rate agrees with the attitude. Without the attitude, if the surface moves
-    against the command of the rig's gearing at the measured deflection.
+    Then the rate agrees with the attitude or, without it, the surface moves against the command of
+    the rig's gearing at the measured deflection.
     """
     name = surface_channel(control)
     if name not in record:
@@ -237,11 +238,11 @@ def _surface_is_reversed(rig: Rig, record: Record, control: ControlName) -> bool
     ratio = rate_ratio(_columns(record), RATE[control])
     if ratio is not None:
         return ratio > 0.0
-    moved = next((n for n in _signals(record, control) if not n.endswith("_N")), None)
+    moved = motions_in(record, control)
     points = surface_points(rig, control) if control in rig.controls else None
-    if moved is None or points is None or PRESSURE not in record:
+    if not moved or points is None or PRESSURE not in record:
         return False
-    command = replay_surface(rig, control, record[moved], record[PRESSURE])
+    command = replay_surface(rig, control, record[moved[0]], record[PRESSURE])
     return plausible.move_oppositely(np.interp(command, *points), record[name])
 
 
@@ -265,7 +266,7 @@ def not_measured(
     """Return a sentence on each sensor of a control, or of the motion, that repeats its readings.
 
     A force may be applied in steps, and δc if it is a set point; they are longer than those of the
-    slowest log. One more sentence tells that the import has interpolated the log's rows.
+    slowest log. Rows that the import has interpolated have a sentence too.
     """
     signals = {} if control is None else _signals(record, control)
     signals |= {name: record[name] for name in motion if name in record}
@@ -361,9 +362,8 @@ def rig_of_manifests(records: Mapping[str, Record]) -> Rig:
 def trimmed(rig: Rig, records: Mapping[str, Record]) -> tuple[dict[str, Rig], str]:
     """Return the rig in the trim at the start of each record, and sentences about the changes.
 
-    A record without a sentence starts in the rig file's trim; one that does not show its trim, in
-    that of the first record that does. Raises InputError if a manifest has another aircraft, or if
-    the aircraft cannot be trimmed at a record's start.
+    A record that does not show its trim has that of the first record that does. Raises InputError
+    if a manifest has another aircraft, or if the aircraft cannot be trimmed at a record's start.
     """
     found, said = dict.fromkeys(records, rig), dict[str, str]()
     if rig.flight is None:
@@ -432,10 +432,7 @@ def _manifest_trim(flight: Flight, record: Record, file: str) -> dict[str, Any] 
 
 
 def _measured_trim(rig: Rig, record: Record, file: str) -> dict[str, Any]:
-    """Return the measured trim at a record's start; empty if it is the rig's or not measured.
-
-    A value within its error of the rig's is the rig's.
-    """
+    """Return the measured trim at a record's start, where it differs by more than its error."""
     assert rig.flight is not None
     names = (SPEED, ALTITUDE, "pitch_rad", "alpha_rad")
     known = {name: record[name] for name in names if name in record}
@@ -478,10 +475,9 @@ def _measured_trim(rig: Rig, record: Record, file: str) -> dict[str, Any]:
 
 
 def _climbs(record: Record, angle: float) -> bool:
-    """Tell whether the altitude confirms that the flight path is off by an angle, rad.
+    """Tell whether the altitude, if recorded, confirms that the flight path is off by an angle.
 
-    An offset of the vane or of the attitude changes the angle, but not the altitude. True if the
-    altitude is not recorded.
+    An offset of the vane or of the attitude changes the angle, but not the altitude.
     """
     if ALTITUDE not in record:
         return True
@@ -537,8 +533,7 @@ def not_in_trim(record: Record, file: str) -> str:
 def density_of(rig: Rig, record: Record) -> float:
     """Return the density of a record's air over the model's at that altitude; 1 if not measured.
 
-    It is 1 up to `NEGLIGIBLE`. The aircraft's forces in other air are those of another mass with
-    other inertias.
+    It is 1 up to `NEGLIGIBLE`. Forces in other air are those of another mass and other inertias.
     """
     names = (PRESSURE, SPEED, ALTITUDE)
     if any(name not in record for name in names):
@@ -609,8 +604,8 @@ def at_rate_of(rig: Rig, records: Mapping[str, Record]) -> Rig:
 def check_moved_by_pilot(rig: Rig, records: Mapping[str, Record]) -> None:
     """Raise InputError if a recorded surface of an aircraft alone cannot drive the model.
 
-    Control laws of the model may move its elevator. Or the position of a surface, in the property
-    of that channel, does not follow its command, as if the model has the position elsewhere.
+    Control laws of the model may move its elevator, or the property of a surface's channel may not
+    follow its command, as if the model has the position elsewhere.
     """
     assert rig.flight is not None
     model, key = rig.flight.model, "flight.model"

@@ -114,7 +114,7 @@ def parts_of(
 ) -> tuple[dict[Part, Records], tuple[str, ...]]:
     """Return the records of each part, by their files' names, and what is not judged, in words.
 
-    They are the parts of one control, or of all that the rig has and the records move.
+    The parts are of one control, or of all that the rig has and the records move.
     """
     if not rig.controls:
         if control is not None:
@@ -183,7 +183,7 @@ def _pulled(record: Record, control: ControlName) -> bool:
 def _beyond_noise(signal: Floats, least: float = 0.0) -> bool:
     """Tell whether the standard deviation of a signal is well above its noise, and above `least`.
 
-    Also true of a signal that holds no number, since the record is then refused with the row.
+    Also true of a signal with a value that is no number: the record is then refused with the row.
     """
     if not np.all(np.isfinite(signal)):
         return True
@@ -198,8 +198,7 @@ def _airframe_first(
 ) -> dict[Part, T]:
     """Return the results of parts: of the airframe, and then of the controls side by side.
 
-    The controls are given the aircraft with what was found in it, since the trim positions of their
-    surfaces depend on it.
+    The trim positions of their surfaces depend on what was found in the aircraft.
     """
     found = {part: work(part, None) for part in parts if not part.own}
     flight = next((rig_of(known).flight for known in found.values()), None)

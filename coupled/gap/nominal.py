@@ -37,6 +37,7 @@ from coupled.gap.effects.effect import (
 from coupled.gap.effects.library import BY_NAME, EFFECTS, LAG
 from coupled.gap.effects.linkage import SERVO
 from coupled.gap.effects.settings import CLOCK, Scales, in_scale, is_dry
+from coupled.gap.noise.noise import rms_of
 from coupled.gap.prepare import as_driven, in_own_trims, readers_of
 from coupled.gap.search.case import Case, Tell
 from coupled.gap.search.fit import fit_set
@@ -90,9 +91,8 @@ def default_keys(
 ) -> tuple[str, ...]:
     """Return the keys that are fitted by default, of the stages that the records can judge.
 
-    A basic gradient of 0 is no spring, a servo frequency of 0 no servo; they are not fitted, nor is
-    a regressor that the file does not name. With imposed motion (`moved`) of the linkage only the
-    play shows.
+    Not a basic gradient of 0, a servo frequency of 0, or a regressor that the file does not name:
+    the rig has none. With imposed motion (`moved`) of the linkage only the play shows.
     """
     fields = {f: key for key, f in fields_of(rig, control, "loader").items()}
     loader = rig.controls[control].loader
@@ -158,9 +158,9 @@ def _bounds(holder: Section, field: str, start: float) -> tuple[float, float]:
 class Number:
     """A fitted parameter: value in the file, fitted value, and half of its 95 % interval.
 
-    `half` is None if the parameter is undetermined, or absent: its filed value is 0, and its 95 %
-    interval includes 0. `most` is then the largest size in this interval. `least` and
-    `greatest` are the bounds of a rig file, or the fit's lower one.
+    `half` is None if the parameter is undetermined, or absent: filed as 0, with 0 in its interval,
+    in which `most` is then the largest size. `least` and `greatest` are the bounds of a rig file,
+    or the fit's lower one.
     """
 
     key: str
@@ -182,10 +182,7 @@ class Number:
 
     @property
     def width(self) -> float:
-        """Half of the interval over the parameter's size, above 1 if it is not determined.
-
-        The size is the filed or the fitted value, whichever is larger.
-        """
+        """Half of the interval over the filed or fitted size, above 1 if it is not determined."""
         if self.half is None:
             return math.inf
         return self.half / max(abs(self.filed), abs(self.found), 1e-300)
@@ -469,8 +466,7 @@ def _doubts_of_servo(
 ) -> tuple[str, ...]:
     """Return the reasons against a fitted servo: low damping, or no better prediction with it.
 
-    `held` is the rig fitted to the stretches that are not held out. A servo that was not fitted is
-    not judged.
+    `held` is the rig fitted to the stretches that are not held out.
     """
     if not {"loader.servo_frequency_Hz", "loader.servo_damping_ratio"} & fitted:
         return ()
@@ -501,7 +497,7 @@ def _doubts_of_servo(
 def _held_out_rms(used: Sequence[Output], rig: Rig) -> float:
     """Return the rms of all residuals on the held-out stretches, in noise floors."""
     left = np.concatenate([output.residual(rig, "held") for output in used])
-    return float(np.sqrt(np.mean(left**2)))
+    return rms_of(left)
 
 
 def _with_starts(
@@ -515,10 +511,7 @@ def _with_starts(
 
 
 def _with_fitted(rig: Rig, control: ControlName, numbers: Sequence[Number]) -> Rig:
-    """Return the rig with the fitted values and their tolerances.
-
-    The values that the host assumes of the loader do not change, since the records contain them.
-    """
+    """Return the rig with fitted values and tolerances; what the host assumes stays as recorded."""
     if control not in rig.controls:
         return rig.changed({one.key: one.found for one in numbers})
     data = rig.controls[control]

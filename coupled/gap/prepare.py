@@ -1,8 +1,5 @@
 """Prepare records for a diagnosis: the drive, the trim, the outputs and the effects to try.
 
-All that depends on the records alone is determined once: the rig with the records' drive and trim,
-the outputs of its stages with their noise floors, and the effects that can be tried.
-
 The input of a machine is a force, set points or an imposed motion, as its records show clearly. A
 digital servo receives set points. In a record faster than the set points each one is held for
 several frames, and they differ by more than one step of a converter; a measured motion repeats
@@ -87,9 +84,8 @@ class Prepared:
 
     `case` holds the rig and the outputs, `library` the effects that can be tried. `trim` and
     `left_out` are sentences for the report: the trim that was taken from the records, and what of
-    the records is not judged. `baseline` is the healthy machine, if it is known. `by_recorder`:
-    rows that no sensor has measured may be the cause of what is found. `density` is that of the
-    air over the model's.
+    the records is not judged. `baseline` is the healthy machine, if known. `by_recorder`: rows that
+    no sensor has measured may be the cause. `density` is that of the air over the model's.
     """
 
     part: Part
@@ -118,9 +114,9 @@ def finely_stepped(
     """Return the rigs of an aircraft alone with the steps that fit, and a sentence on a change.
 
     An aircraft moves continuously, and wide steps of its model act like an error of its damping and
-    of the time stamps. A log of a simulation may have a step per row. So steps wider than JSBSim's
-    own are compared with finer ones by the residuals without effects, as white noise of unknown
-    variance. The steps of a record with the rig in its manifest are known.
+    of the time stamps; but a log of a simulation may have a step per row. So steps wider than
+    JSBSim's own are compared with finer ones by the residuals without effects, as white noise of
+    unknown variance. The steps of a record with the rig in its manifest are known.
     """
     rig = next(iter(trims.values()))
     assert rig.flight is not None
@@ -157,10 +153,10 @@ def prepare(
 ) -> Prepared:
     """Return records prepared for the diagnosis of a part, by their files' names.
 
-    With `terms`, the named functions of the model's aerodynamics are tried (`stages.tried`).
-    With a `baseline`, the rig is that of the healthy machine, and its model error raises the noise
-    floors. `flight` is the aircraft with what was found in it before. Raises InputError if a record
-    cannot be of this rig, or if no stage can be judged.
+    With `terms`, the named functions of the model's aerodynamics are tried (`stages.tried`). With a
+    `baseline`, the rig is that of the healthy machine, and its model error raises the noise floors.
+    `flight` is the aircraft with what was found in it before. Raises InputError if a record cannot
+    be of this rig, or if no stage can be judged.
     """
     if baseline is not None:
         rig = baseline.rig
@@ -261,8 +257,7 @@ def in_own_trims(outputs: Sequence[Output], readers: Sequence[Reader]) -> list[O
 class Judged:
     """The outputs that can be judged, with noise floors estimated with a given rig.
 
-    The outputs of the last rigs are cached. If rigging and aircraft do not change, the airframe is
-    not flown again.
+    Those of the last rigs are cached, and the flights, if neither rigging nor aircraft change.
     """
 
     rig: Rig
@@ -285,7 +280,9 @@ class Judged:
         readers = [reader.under(rig) for reader in self.readers]
         own = readers if self.part.own else []
         makers: list[Callable[[], list[Output]]] = [reader.outputs for reader in own]
-        alike = bool(self._known) and _has_same_flight(self.rig, rig)
+        rigging = [[one.rigging for one in each.controls.values()] for each in (self.rig, rig)]
+        same = rigging[0] == rigging[1] and self.rig.flight == rig.flight
+        alike = bool(self._known) and same
         for one in readers if self.part.airframe and not alike else []:
             flights = self._flights.setdefault(one.number, Flights())
             makers.append(partial(airframe_outputs, one.rig, one.record, one.number, flights))
@@ -296,14 +293,6 @@ class Judged:
         elif rig == self.rig:
             self._flown[:] = [output for output in made if output.stage == AIRFRAME]
         return made if self.baseline is None else self.baseline.raised(made)
-
-
-def _has_same_flight(one: Rig, other: Rig) -> bool:
-    """Tell whether two rigs' surfaces and aircraft are the same."""
-    rigged = all(
-        one.controls[name].rigging == other.controls[name].rigging for name in one.controls
-    )
-    return rigged and one.flight == other.flight
 
 
 def _too_little(rig: Rig, control: ControlName, readers: Sequence[Reader]) -> str:
@@ -334,8 +323,7 @@ def as_driven(rig: Rig, records: Collection[Record], control: ControlName) -> Ri
 def _is_computed(record: Record, control: ControlName) -> bool:
     """Tell whether δc is a computed number, not a measured motion.
 
-    Only for records without other channels of loader or host, since in a simulation without noise
-    δc has no noise either.
+    Only for records without other channels of loader or host: a simulation may have no noise.
     """
     others = (channel(control, q) for q in ("gradient", "modifying_force", "estimate"))
     given, grip = channel(control, "computed"), channel(control, "deflection")
@@ -347,10 +335,9 @@ def _is_computed(record: Record, control: ControlName) -> bool:
 def _estimate_quietest_noise(signal: Floats) -> float:
     """Return the rms noise of the quietest stretches in which a signal moves; infinite if none.
 
-    Fourth differences have 70 times the variance of white noise. In the quietest short stretches
-    the motion adds almost nothing to them. Over all frames of a chirp the estimate would include
-    the chirp. Motion slower than two converter steps a frame is left out, since its values repeat
-    by rounding.
+    Fourth differences have 70 times the variance of white noise. The motion adds almost nothing to
+    them in the quietest short stretches, but a chirp does over all frames. Motion slower than two
+    converter steps a frame is left out, since its values repeat by rounding.
     """
     steps = np.abs(np.diff(signal))
     if not np.any(steps) or len(steps) < FEW_FRAMES + 4:
@@ -380,7 +367,7 @@ def in_set_points(signal: Floats) -> bool:
 def as_counted(rig: Rig, records: Collection[Record], control: ControlName) -> Rig:
     """Return the rig with zeros that may be off by a count of their channels, where these count.
 
-    A channel counts where its rounding is half of its noise or more. What the file says stays.
+    They count if the rounding is half of the noise or more. Tolerances of the file stay.
     """
     known = rig.controls[control].tolerance
     found = dict(known)

@@ -8,7 +8,7 @@ has no motion except the dynamic pressure given to the host. Channels of sensors
 from __future__ import annotations
 
 import difflib
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from functools import cache
 from typing import Literal
 
@@ -118,6 +118,12 @@ def channel(control: str, quantity: str) -> str:
         if plain.split("_{d}")[0].split("_N")[0] == quantity:
             return name
     raise KeyError(quantity)
+
+
+def motions_in(recorded: Container[str], control: str) -> list[str]:
+    """Return the recorded channels of a control's motion, δc before δ."""
+    names = (channel(control, quantity) for quantity in ("computed", "deflection"))
+    return [name for name in names if name in recorded]
 
 
 def record_channels(controls: Sequence[str], flown: bool) -> tuple[str, ...]:

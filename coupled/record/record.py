@@ -113,7 +113,7 @@ class Record(TableResult):
             raise MissingKeyError("record", "", problem)
         return self.data[:, self.channels.index(channel)]
 
-    def __contains__(self, channel: str) -> bool:
+    def __contains__(self, channel: object) -> bool:
         return channel in self.channels
 
     def __len__(self) -> int:

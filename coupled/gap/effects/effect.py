@@ -97,11 +97,6 @@ class Parameter:
         """Whether a smaller value has a larger effect."""
         return self.kind == "limit"
 
-    @property
-    def host(self) -> str:
-        """The name of the host's own value, which is then to be corrected; empty without one."""
-        return HOST_VALUES.get(self.key, "")
-
     def named(self, control: str) -> str:
         """Return the parameter's name with its unit on a control."""
         return self.name.format(d=unit_of(control))

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.errors import InputError
-from coupled.gap.noise.lines import lines_in, tone_of
+from coupled.gap.noise.lines import lines_in, seen_as
 from coupled.gap.noise.smooth import smoothed
 from coupled.gap.signals.output import Floats, Output
 from coupled.gap.thresholds import FEW, MORE, RIPPLE_PERIODS, TRIES
@@ -42,8 +42,7 @@ def hums(outputs: Sequence[Output], rig: Rig, control: ControlName) -> list[dict
     first = ours[0]
     slowest = 2.0 * math.pi * HUM_Hz / first.frame_rate_Hz
     for line in lines_in(first.residual(rig) * first.floor, slowest):
-        seen_Hz = line.turn * first.frame_rate_Hz / (2.0 * math.pi)
-        tone_Hz = tone_of(seen_Hz, first.frame_rate_Hz)
+        tone_Hz = seen_as(line, first.frame_rate_Hz).tone_Hz
         turns = tone_Hz / first.frame_rate_Hz * 2.0 * math.pi
         # A tone aliased from an odd Nyquist zone has the opposite phase direction.
         backwards = math.cos(turns - line.turn) < math.cos(turns + line.turn)

@@ -1,7 +1,7 @@
 """The library's parameters on a machine: those that are nuisance parameters, and their scale.
 
 A value that may be off within a tolerance, without an effect, is a nuisance parameter. The default
-tolerance is 1 or 2 %, to which a potentiometer is set and a servo tuned. The file of a nominal rig
+tolerance is 1 or 2 %, to which a potentiometer is set and a servo tuned; the file of a nominal rig
 fitted to records of the machine (`nominal`) has the tolerance of each fitted value.
 
 A parameter in the unit Nᵃ·dᵇ·sᶜ has the scale Fᵃ·xᵇ·tᶜ, with the rms force F, the rms motion x
@@ -9,9 +9,8 @@ about its mean, and the time t = x/v with the rms speed v; kg is N·s²/d. Frict
 equals the rms force, and damping of one scale balances it at the rms speed.
 
 The library's starts and bounds suit a control column. For a machine of another order of magnitude
-they are multiplied by Fᵃ·xᵇ over the column's, so that the fits do not depend on units. A bound of
-a force is at least several times the rms force. Parameters for each unit of a regressor have starts
-and bounds in rms forces over its standard deviation.
+they are multiplied by Fᵃ·xᵇ over the column's. A bound of a force is at least several times the rms
+force. Parameters for each unit of a regressor are in rms forces over its standard deviation.
 """
 
 from __future__ import annotations
@@ -25,11 +24,12 @@ import numpy as np
 
 from coupled.gap.effects.effect import BY_REGRESSOR, Effect, Parameter, entry, setting_of, value
 from coupled.gap.effects.library import BY_NAME, EFFECTS, LAG, MOTION, STAMP
+from coupled.gap.noise.noise import rms_of
 from coupled.gap.noise.smooth import rate_of, smoothed
 from coupled.gap.signals.output import Output
 from coupled.gap.signals.reading import Reading
 from coupled.gap.thresholds import COLUMN_FORCE_N, COLUMN_WAY, MINOR, OTHER_SCALE, CLOCK_s, YIELDS_m
-from coupled.record.channels import ControlName, unit_of
+from coupled.record.channels import ControlName, motions_in, unit_of
 from coupled.rig.rig import Rig
 
 # A time stamp error of the force, within the tolerance of a recorder's clocks.
@@ -180,11 +180,10 @@ class Scales:
         """Return the scales of records; None where they lack force or motion, or nothing moves."""
         forces, ways, speeds, others = [], [], [], []
         for reading in readings:
-            names = (reading.name_of(quantity) for quantity in ("computed", "deflection"))
-            moved = next((name for name in names if name in reading.record), None)
-            if moved is None or reading.name_of("force") not in reading.record:
+            moved = motions_in(reading.record, reading.control)
+            if not moved or reading.name_of("force") not in reading.record:
                 continue
-            way = smoothed(reading.record[moved])
+            way = smoothed(reading.record[moved[0]])
             forces.append(reading.record[reading.name_of("force")])
             ways.append(way - way.mean())
             speeds.append(rate_of(way, reading.rig.frame_rate))
@@ -192,9 +191,7 @@ class Scales:
                 others.append(other)
         if not forces:
             return None
-        force, way_d, speed = (
-            float(np.sqrt(np.mean(np.concatenate(each) ** 2))) for each in (forces, ways, speeds)
-        )
+        force, way_d, speed = (rms_of(np.concatenate(each)) for each in (forces, ways, speeds))
         spread = float(np.std(np.concatenate(others))) if others else 0.0
         return cls(force, way_d, way_d / speed, spread) if min(force, way_d, speed) > 0.0 else None
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from coupled.gap.chain import stage_of
-from coupled.gap.effects.effect import Effect, Parameter, field_of
+from coupled.gap.effects.effect import HOST_VALUES, Effect, Parameter, field_of
 from coupled.gap.effects.settings import contact, is_dry, settings
 from coupled.gap.findings.budget import StageBudget
 from coupled.gap.findings.credibility import credibility
@@ -213,6 +213,6 @@ def estimate(
         found=float(p.entered(filed, value)),
         found_low=found_low,
         found_high=found_high,
-        host=p.host if hosted else "",
+        host=HOST_VALUES.get(p.key, "") if hosted else "",
         relative=p.mode == "factor",
     )

@@ -41,10 +41,11 @@ import numpy as np
 from scipy.special import nctdtrinc, stdtrit
 
 from coupled.display import unit_in
+from coupled.gap.noise.noise import rms_of
 from coupled.gap.noise.smooth import rate_of, smoothed
 from coupled.gap.signals.output import Floats, Output, memory
 from coupled.gap.thresholds import CHANGE_CHANCE, FEW, NEARLY_ALL, ROUNDING_SPAN, SMALL, TINY
-from coupled.record.channels import ControlName, channel
+from coupled.record.channels import ControlName, channel, motions_in
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
 
@@ -209,7 +210,7 @@ class _Motions:
     def of(cls, motions: Sequence[Floats]) -> _Motions:
         """Return the numbers of some motions, each place and speed, shape (2, frames)."""
         place, speed = np.concatenate(motions, axis=1)
-        still = SMALL * float(np.sqrt(np.mean(speed**2)))
+        still = SMALL * rms_of(speed)
         moving = np.abs(speed) > still
         usual = float(np.mean(np.abs(speed[moving]))) if moving.any() else still
         known = cls(still, (usual, float(np.median(place))), np.ones(len(SLOPES)))
@@ -293,14 +294,13 @@ def _signals(
     """Return each record's signals by name: the force, and the residual of each output."""
     found = []
     for number, record in enumerate(records):
-        names = (channel(control, quantity) for quantity in ("computed", "deflection"))
-        place = next((smoothed(record[name]) for name in names if name in record), None)
+        place = next((smoothed(record[name]) for name in motions_in(record, control)), None)
         ours: dict[str, _Signal] = {}
         if place is not None:
             moved = np.array([place, rate_of(place, rig.frame_rate)])
             force = channel(control, "force")
             if with_force and force in record:
-                rms = float(np.sqrt(np.mean(record[force] ** 2)))
+                rms = rms_of(record[force])
                 ours[force] = _Signal("loader", record[force], moved, rms, ROUNDING_SPAN * rms)
             for one in (o for o in outputs if o.record == number and len(o.measured) == len(place)):
                 left, rms = one.residual(rig) * one.floor, float(np.std(one.measured))
@@ -349,7 +349,7 @@ def _condensed(signal: _Signal, about: _Motions) -> dict[str, tuple[float, float
     rough = np.diff(values, 2, prepend=values[:2])
     for rows, name in sides:
         for what, signed in (("spread", left), ("roughness", rough)):
-            size = float(np.sqrt(np.mean(signed[rows] ** 2)))
+            size = rms_of(signed[rows])
             found[f"{what} in {name} direction"] = math.log(max(size, 1e-300)), 0.0
     return found
 

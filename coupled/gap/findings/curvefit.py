@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from coupled.display import split_unit
 from coupled.errors import InputError
+from coupled.gap.noise.noise import rms_of
 from coupled.gap.search.evidence import misfit
 from coupled.gap.search.problem import ModelError
 from coupled.gap.signals.output import Floats, Output, Part, memory
@@ -331,14 +332,14 @@ def _smooth(basis: Basis, at: Sequence[int]) -> Floats:
 def with_nodes(basis: Basis, sums: Sums, at: Sequence[int]) -> Pick:
     """Return the curve with nodes at given places, and the smoothness of the largest evidence."""
     own, rough = sums.of(_mix(basis, at)), _smooth(basis, at)
-    size = max(float(np.sqrt(np.mean(_least_squares(*own.weighted()) ** 2))), 1e-300)
+    size = max(rms_of(_least_squares(*own.weighted())), 1e-300)
     level = np.eye(len(rough)) / (WIDTH * size) ** 2
     each = [own.posterior(level + rough / (kink * size) ** 2) for kink in CURVE_KINKS]
     return Pick(tuple(at), max(each, key=lambda one: one.log))
 
 
 def choose(basis: Basis, sums: Sums, entries: Sequence[float]) -> Pick:
-    """Return the curve with nodes of the largest evidence, from its ends, and from the entries."""
+    """Return the curve of the largest evidence, with nodes added to the ends, or to the entries."""
     ends = {0, len(basis.places) - 1, *np.flatnonzero(basis.places == 0.0).tolist()}
     own = ends | {*np.flatnonzero(np.isin(basis.places, entries)).tolist()}
     starts = [ends, own] if len(ends) < len(own) < CURVE_NODES else [ends]

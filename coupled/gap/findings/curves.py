@@ -47,6 +47,7 @@ from coupled.gap.findings.curvefit import (
 from coupled.gap.findings.result import EffectResult
 from coupled.gap.findings.summary import joined, plain
 from coupled.gap.findings.where import signals
+from coupled.gap.noise.noise import rms_of
 from coupled.gap.noise.smooth import smoothed
 from coupled.gap.search.case import Case
 from coupled.gap.search.evidence import (
@@ -58,7 +59,7 @@ from coupled.gap.search.evidence import (
 )
 from coupled.gap.search.found import Choice, Fit
 from coupled.gap.search.problem import ModelError, Problem
-from coupled.gap.signals.output import Floats, Output, explained_below, stage_gaps, stage_limits
+from coupled.gap.signals.output import Floats, Output, stage_gaps, unexplained
 from coupled.gap.signals.reading import LOAD
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points
@@ -266,8 +267,7 @@ def _above_noise(problem: Problem, choice: Choice) -> frozenset[str]:
 def _open_outputs(case: Case, choice: Choice, rig: Rig) -> set[str]:
     """Return the outputs whose residual with a rig exceeds that of an explained stage."""
     root = stage_gaps(case.outputs, choice.without_effects.rig)
-    left, limits = stage_gaps(case.outputs, rig), stage_limits(case.outputs)
-    return {at for at, gap in left.items() if gap > explained_below(root[at], limits[at])}
+    return unexplained(root, stage_gaps(case.outputs, rig), case.outputs)
 
 
 # A curve as reported, the rig with it, its law, its nodes and values by the fitted stretches, and
@@ -387,7 +387,7 @@ class _Fitter:
         record = self.records[outputs[0].record]
         if name not in record:  # δc
             name = f"{self.case.control}_deflection_{unit_of(self.case.control)}"
-        return NEGLIGIBLE * float(np.sqrt(np.mean(record[name] ** 2)))
+        return NEGLIGIBLE * rms_of(record[name])
 
     def _with(self, law: Law, values: Values) -> Rig | None:
         return with_curve(self.rig, self.case.control, law, *values)
@@ -500,7 +500,7 @@ class _Fitter:
             known = signals(output, output.residual(self.rig), record, control, "loader")
             d = unit_of(control)
             force = known[f"computed_{d}"] * np.abs(known[f"computed_rate_{d}_per_s"])
-            size = self._step(basis.law, outputs) / float(np.sqrt(np.mean(force**2)))
+            size = self._step(basis.law, outputs) / rms_of(force)
             found.append(response_to_force(self.rig, control, record, output, size * force))
         return {"c·δ·|v|": found}
 

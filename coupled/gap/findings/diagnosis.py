@@ -382,13 +382,10 @@ def verdict_of_all(parts: Sequence[Findings]) -> Verdict:
     found = next((verdict for verdict in _WORST if verdict in with_gap), None)
     if found is not None:
         return found
-    judged = [part for part in parts if not _stands_still(part)] or parts
+    # Of controls that breakout and friction hold, the structure bends at most.
+    still = [any(s.hidden is not None and s.hidden.still for s in part.stages) for part in parts]
+    judged = [part for part, held in zip(parts, still, strict=True) if not held] or parts
     return "ambiguous" if any(part.verdict == "ambiguous" for part in judged) else "no_gap"
-
-
-def _stands_still(part: Findings) -> bool:
-    """Tell whether breakout and friction held a control: its structure bends at most."""
-    return any(stage.hidden is not None and stage.hidden.still for stage in part.stages)
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)

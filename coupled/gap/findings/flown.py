@@ -27,6 +27,7 @@ from coupled.gap.effects.library import BY_NAME
 from coupled.gap.findings.budget import shapley_subsets
 from coupled.gap.findings.result import labelled
 from coupled.gap.findings.summary import joined, plain
+from coupled.gap.noise.noise import rms_of
 from coupled.gap.noise.smooth import smoothed
 from coupled.gap.signals.output import Floats
 from coupled.gap.signals.reading import LOAD, PRESSURE, drifts, softest_gradient
@@ -155,7 +156,7 @@ class Again:
         if flown is None:
             return None
         rows = min(len(flown), len(record))
-        rms = {n: float(np.sqrt(np.mean((flown[n][:rows] - record[n][:rows]) ** 2))) for n in names}
+        rms = {n: rms_of(flown[n][:rows] - record[n][:rows]) for n in names}
         return rms, rows / rig.frame_rate
 
 

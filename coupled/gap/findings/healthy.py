@@ -26,6 +26,7 @@ from coupled.gap.effects.settings import ALONE
 from coupled.gap.findings.budget import by_stretch
 from coupled.gap.findings.changed import Comparison, compare
 from coupled.gap.findings.result import StageResult, Verdict
+from coupled.gap.noise.noise import rms_of
 from coupled.gap.noise.smooth import smoothed
 from coupled.gap.search.case import Case
 from coupled.gap.search.found import Fit
@@ -58,7 +59,7 @@ class ModelError:
         lefts = [output.residual(rig) * output.floor for output in outputs]
         power = float(np.mean(np.concatenate(lefts) ** 2))
         noise = float(np.mean([output.floor**2 for output in outputs]))
-        each = [float(np.sqrt(np.mean(left**2))) for left in lefts]
+        each = [rms_of(left) for left in lefts]
         blocks = np.concatenate(
             [
                 by_stretch(left**2, output.stretches) / np.bincount(output.stretches)

@@ -25,6 +25,7 @@ from coupled.gap.effects.library import EFFECTS
 from coupled.gap.effects.settings import contact, settings
 from coupled.gap.findings.flown import fly_force
 from coupled.gap.findings.summary import plain
+from coupled.gap.noise.noise import rms_of
 from coupled.gap.search.case import Case
 from coupled.gap.search.evidence import likelier_by
 from coupled.gap.search.found import Choice
@@ -118,7 +119,7 @@ def _signature(
         if basis.size:
             change = change - basis @ np.linalg.lstsq(basis, change, rcond=None)[0]
         wanted = math.sqrt(output.limit**2 - 1.0)
-        largest = max(largest, float(np.sqrt(np.mean(change**2))) / wanted)
+        largest = max(largest, rms_of(change) / wanted)
     return largest
 
 

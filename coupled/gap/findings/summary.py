@@ -249,11 +249,10 @@ def _since(found: Findings) -> str:
 def _between(stage: str, where: Where) -> list[str]:
     """Return onset and end of a stage's gap, if it is not there all the time."""
     begins, ends = (f"{span.value:.1f} s" if span else "" for span in (where.begins, where.ends))
-    if begins and ends:
-        return [f"The residual of the {stage} exceeds its noise from {begins} to {ends}."]
-    if begins:
-        return [f"The residual of the {stage} exceeds its noise from {begins} on."]
-    return [f"The residual of the {stage} exceeds its noise until {ends}."] if ends else []
+    if not begins and not ends:
+        return []
+    span = f"until {ends}" if not begins else f"from {begins} {f'to {ends}' if ends else 'on'}"
+    return [f"The residual of the {stage} exceeds its noise {span}."]
 
 
 def in_time(effect: EffectResult) -> str:

@@ -1,18 +1,16 @@
-"""Where a residual lies, since when, and what a model free in form predicts of it.
+"""Where a residual lies, since when, and what a nonparametric model predicts of it.
 
 Ridge regressions show whether the stage's own signals predict a residual that the effects leave:
 piecewise linear functions of one signal, with knots at its quantiles, lagged copies, the same
 filtered by the stage's response, or all signals with their pairwise products. The models are fitted
-on every other stretch and compared on the stretches between.
+on every other stretch and compared on the stretches between. The share of variance that a straight
+line over each signal explains is given too, with its slope.
 
-The residual is regressed on each of the stage's own signals: the share of its variance that a
-straight line explains, and the slope. Onset and end are found by windows of the same excitation.
-
-A gap that grows with the motion is small while the motion is small, which is no onset. So a quiet
-window is evidence only in comparison with the loud windows that were excited no more, in every
-signal that drives the stage. If nearly all of these are loud, something has changed in between. If
-excitation alone decided, all windows before would be quiet with probability Π(1 − q), where q is
-the loud share of the windows excited no more.
+Onset and end are found by windows of the same excitation: a gap that grows with the motion is small
+while the motion is small, which is no onset. A quiet window is evidence only in comparison with the
+loud windows that were excited no more, in every signal that drives the stage. If excitation alone
+decided, all windows before the onset would be quiet with probability Π(1 − q), where q is the loud
+share of the windows excited no more.
 """
 
 from __future__ import annotations
@@ -21,14 +19,14 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations, pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from coupled.gap.chain import AIRFRAME as FLOWN
 from coupled.gap.noise.lines import SeenLine, widest_line
-from coupled.gap.noise.noise import filtered, of_second_order
+from coupled.gap.noise.noise import filtered, of_second_order, rms_of
 from coupled.gap.noise.smooth import rate_of, smoothed
 from coupled.gap.search.course import Bounds
 from coupled.gap.signals.output import TRIM, Floats, Output
@@ -210,7 +208,7 @@ def where(output: Output, rig: Rig, record: Record, control: ControlName) -> Whe
         peak_Hz=_peak(left, rate_Hz),
         by_pressure=_by(left, smoothed(record[PRESSURE])) if varies else (),
         line=widest_line(left, output.floor, rate_Hz),
-        **vars(in_time(left, drives, rate_Hz)),
+        **in_time(left, drives, rate_Hz)._asdict(),
     )
 
 
@@ -379,7 +377,7 @@ def _by(left: Floats, pressure: Floats) -> tuple[Mapping[str, float], ...]:
     for low, high in pairwise(edges.tolist()):
         rows = (pressure >= low) & (pressure <= high)
         if rows.any():
-            gap = float(np.sqrt(np.mean(left[rows] ** 2)))
+            gap = rms_of(left[rows])
             found.append({"from_Pa": low, "to_Pa": high, "gap": gap})
     return tuple(found)
 
@@ -387,12 +385,8 @@ def _by(left: Floats, pressure: Floats) -> tuple[Mapping[str, float], ...]:
 Mask = NDArray[np.bool_]
 
 
-@dataclass(frozen=True)
-class InTime:
-    """The share of the windows in which a residual is loud, and its onset and end.
-
-    These, in s from the record's start, are None if the excitation can explain them.
-    """
+class InTime(NamedTuple):
+    """The share of loud windows, and onset and end, s; None if the excitation explains them."""
 
     loud: float
     begins: Bounds | None

@@ -94,7 +94,7 @@ def seen_as(line: Line, rate_Hz: float) -> SeenLine:
 
 
 def widest_line(left: Floats, floor: float, rate_Hz: float) -> SeenLine | None:
-    """Return the tone with the largest amplitude in a residual, if it is a notable share of it.
+    """Return the tone of largest amplitude in a residual, if it is a notable share of its power.
 
     The residual is in noise floors, `floor` in the signal's unit.
     """

@@ -7,12 +7,10 @@ to frame. This model extrapolates to lower frequencies. Of each band only the lo
 the spectrum count, so that a line (mains hum) is not taken for noise. A log that was filtered or
 resampled has almost no power there, and its noise cannot be estimated.
 
-Of a residual, it is estimated from the quieter pieces of half a second. The spectrum of a control
-that sticks, slips or closes its backlash falls as slowly as that of coloured noise, and hides the
-noise. A stage's residual contains that only as far as the stage has a gap. The spectrum is taken in
-short pieces, and at each frequency the 30 % quantile of the pieces counts, so that rare events are
-left out; lines of the mains are rejected as outliers. The noise is white, or that of a first-order
-lag, as of a channel.
+Of a residual, it is estimated with the same models. The spectrum of a control that sticks, slips or
+closes its backlash falls as slowly as that of coloured noise, and a residual contains it only as
+far as the stage has a gap. The spectrum is taken in pieces of half a second, and at each frequency
+the 30 % quantile of the pieces counts, so that rare events are left out; lines are outliers.
 
 The noise of a force cannot be taken from a residual, since the force is an input. There the
 signal's own spectrum, which falls with some power of frequency, is fitted together with the noise.
@@ -56,10 +54,15 @@ Floats = NDArray[np.float64]
 Coefficients = Sequence[float] | Floats
 
 
+def rms_of(signal: Floats) -> float:
+    """Return the root of a signal's mean square."""
+    return float(np.sqrt(np.mean(signal**2)))
+
+
 def filtered(above: Coefficients, below: Coefficients, signal: Floats) -> Floats:
     """Return Σ above[i]·x[k−i] = Σ below[i]·y[k−i] solved for y, from rest; shape of x.
 
-    The coefficients are those of z⁰, z⁻¹ and so on. Columns are filtered separately.
+    The coefficients are those of z⁰, z⁻¹ and so on; columns of x are filtered separately.
     """
     driven = above[0] * signal
     for lag, share in enumerate(above[1:], 1):
@@ -136,7 +139,7 @@ def jumps(signal: Floats) -> bool:
     if not len(rough):
         return False
     usual = float(np.median(np.abs(rough))) / 0.6745
-    return usual < MOST * float(np.sqrt(np.mean(rough**2)))
+    return usual < MOST * rms_of(rough)
 
 
 def between_jumps(signal: Floats) -> Noise:
@@ -149,7 +152,7 @@ def between_jumps(signal: Floats) -> Noise:
 def _bands(rough: Floats) -> tuple[Floats, Floats]:
     """Return the middle frequencies of bands, rad a frame, and the noise's variance in each.
 
-    `rough` are fourth differences, with the gain |2 sin(ω/2)|⁸ of power. The mean of each band is
+    `rough` are fourth differences, with the gain |2 sin(ω/2)|⁸ of power. The mean of a band is
     that of its lower part, corrected for the bias with an exponential distribution.
     """
     taper = np.hanning(len(rough))
@@ -175,9 +178,8 @@ def _shape(at: Floats, memory: float) -> Floats:
 def _memory(at: Floats, levels: Floats, first: int, variance: float) -> float:
     """Return the correlation of the noise by frames; 0 if white noise explains it as well.
 
-    The bands from `first` on are noise. Lower bands are added as long as they agree with the
-    extrapolation. A signal's spectrum is much steeper than a first-order lag, so it departs at
-    once.
+    Lower bands than those from `first` on are added while they agree with the extrapolation. A
+    signal's spectrum is much steeper than a first-order lag's, so it departs at once.
     """
     memory, logs = 0.0, np.log(np.maximum(levels, 1e-300))
     while True:

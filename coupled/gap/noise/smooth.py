@@ -84,10 +84,7 @@ class Rest:
 
 
 def rest_of(signal: Floats, noise: Noise) -> Rest:
-    """Return the rests of a signal; none if it has no noise or is short.
-
-    None either if the noise is a large part of the signal, since that may be motion.
-    """
+    """Return the rests of a signal; none if it is short or its noise is zero or large."""
     share, level = np.zeros(len(signal)), np.zeros(len(signal))
     ends, errors = list[tuple[int, int]](), list[float]()
     clear = 0.0 < noise.rms <= SMALL * float(np.std(signal))
@@ -151,8 +148,8 @@ class Corners:
 def corners_in(signal: Floats) -> Corners:
     """Return the corners of a signal, in their order.
 
-    Corners that a few frames show are taken out first, since others may lie beside them. At the end
-    each is fitted again over more frames, up to the next corner, which excludes bends.
+    Corners that a few frames show are subtracted first, since others may lie beside them. At the
+    end each is fitted again over more frames, up to the next corner, which excludes bends.
     """
     frames, corners = np.arange(len(signal), dtype=np.float64), dict[int, tuple[float, float]]()
     noise = float(np.median(np.abs(np.diff(signal, 2)))) / 0.6745 / math.sqrt(6.0)
@@ -186,10 +183,7 @@ def corners_in(signal: Floats) -> Corners:
 
 
 def _turns(signal: Floats, reach: int) -> Floats:
-    """Return the change of slope at each frame over so many frames to either side, same shape.
-
-    By least squares with a straight line; zero at the ends.
-    """
+    """Return the change of slope over so many frames to either side, fitted; 0 at the ends."""
     shape = np.abs(np.arange(-reach, reach + 1.0))
     shape -= shape.mean()
     found = np.zeros(len(signal))
@@ -239,25 +233,25 @@ class Smoother:
         orders: Sequence[int] = (3, 2, 1),
         noise: Noise | None = None,
         with_corners: bool = False,
+        inside: bool = False,
     ) -> Smoother:
         """Return the best smoother of a signal, with differences of one of these orders.
 
         `noise` gives the colour of the noise; by default it is estimated from the signal. A signal
-        may have corners if it is no motion of a mass.
+        may have corners if it is no motion of a mass. `inside`: the ends do not count.
         """
         whole = np.ascontiguousarray(signal, dtype=np.float64).tobytes()
-        return _known(whole, tuple(orders), noise, with_corners, False)
+        return _known(whole, tuple(orders), noise, with_corners, inside)
 
     @classmethod
     def of_imposed(cls, signal: Floats, noise: Noise) -> Smoother:
         """Return the best smoother of an imposed motion, whose ends are not judged.
 
         The loader's force follows from the second derivative, so noise above the bandwidth of the
-        motion must be removed. The extension of the signal has a step of curvature at the ends. The
-        ends are left out of the choice, because this step would raise the cutoff frequency.
+        motion must be removed. The extension of the signal has a step of curvature at the ends,
+        which would raise the cutoff frequency.
         """
-        whole = np.ascontiguousarray(signal, dtype=np.float64).tobytes()
-        return _known(whole, MOTION_ORDERS, noise, False, True)
+        return cls.of(signal, MOTION_ORDERS, noise, inside=True)
 
     def smooth(self, signal: Floats) -> Floats:
         """Return the signal of the smoother without its noise, same shape, zero phase."""
@@ -275,8 +269,7 @@ class Smoother:
     def imposed(cls, signal: Floats, noise: Noise) -> tuple[Floats, Callable[[int], Floats]]:
         """Return an imposed motion without its noise, and with a numbered sample of its error.
 
-        The error is that of the smoother of a motion with this noise, which a log that was filtered
-        no longer contains.
+        The error is that of the smoother of a motion with this noise, which a filtered log lacks.
         """
         frames = len(signal)
         smooth = cls.of_imposed(signal, noise).smooth(signal)
@@ -291,7 +284,7 @@ class Smoother:
     def wiener_error(self, level: Noise, frames: int, rng: np.random.Generator) -> Floats:
         """Return a sample of the smoothing error, PSD H·Sₙ: noise passed and signal lost.
 
-        It holds for a signal whose Wiener filter is this smoother; `level` is its noise.
+        For a signal whose Wiener filter is this smoother; `level` is its noise.
         """
         return self._sample(level, frames, rng, self.gain)
 
@@ -328,8 +321,7 @@ def _known(
 def _colour(signal: Floats, noise: Noise | None) -> float:
     """Return the noise's correlation from frame to frame, as given or as estimated.
 
-    Zero for a filtered log, and for noise that is a large part of the signal, since its colour may
-    then be the signal's.
+    Zero for a filtered log, and for large noise, whose colour may be the signal's.
     """
     if noise is None and not noise_of(signal).filtered:
         noise = noise_of_input(signal)
@@ -340,8 +332,8 @@ def _colour(signal: Floats, noise: Noise | None) -> float:
 def _gain(long: Floats, orders: Sequence[int], memory: float, inside: int | None) -> Floats:
     """Return the gain with the least generalised cross-validation score for an extended signal.
 
-    The noise correlates from frame to frame by `memory`. With an extension `inside` which the
-    signal begins, only the frames count that are judged under an imposed motion.
+    The noise correlates from frame to frame by `memory`. `inside` is the extension of an imposed
+    motion, of which only the judged frames count.
     """
     rate = 2.0 * np.sin(np.pi * np.fft.rfftfreq(len(long)))
     colour = (1.0 + memory) ** 2 / ((1.0 - memory) ** 2 + memory * rate**2)  # 1 at Nyquist
@@ -367,15 +359,13 @@ def _gain(long: Floats, orders: Sequence[int], memory: float, inside: int | None
 
 
 def unjudged(gain: Floats, frames: int) -> int:
-    """Return the number of frames at each end where smoothing distorts a moving signal."""
-    return min(_memory_of(gain), int(SMALL * frames))
+    """Return the number of frames at each end where smoothing distorts a moving signal.
 
-
-def _memory_of(gain: Floats) -> int:
-    """Return the number of frames beyond which an impulse response is below `NEGLIGIBLE` in sum."""
+    Beyond so many frames the impulse response is below `NEGLIGIBLE` in sum.
+    """
     size = np.abs(np.fft.irfft(gain))[: len(gain)]
     beyond = np.cumsum(size[::-1])[::-1]
-    return int(np.argmax(beyond <= NEGLIGIBLE * beyond[0]))
+    return min(int(np.argmax(beyond <= NEGLIGIBLE * beyond[0])), int(SMALL * frames))
 
 
 def smoothed(signal: Floats, noise: Noise | None = None) -> Floats:

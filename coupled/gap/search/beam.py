@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -313,10 +314,7 @@ def _fit_neighbours_of_best(beam: Beam, library: Sequence[Effect]) -> None:
                 beside = _candidates(part.effects, library, {*law.shows_in})
                 worth = Worth(PRIOR_EFFECT, beam.counts)
                 screened = beam.screen.best(part, beside, worth, TRIES)
-                _fit_sets(
-                    beam,
-                    [t for one in screened for t in _starts_with_one_more(beam, part, one)],
-                )
+                _fit_sets(beam, _starts_with_one_more(beam, part, screened))
         _finish(beam)
 
 
@@ -364,20 +362,15 @@ def _fit_neighbours(beam: Beam, fitted: Fit, library: Sequence[Effect], wanted: 
             still = beam.screen.still_worth(fitted, some, beam.worth(found, MOST))
         dry = next((one for one in still if one.effect.dry), None)
         if dry is not None and not beam.contact:
-            first = _fit_sets(beam, _starts_with_one_more(beam, fitted, dry))
+            first = _fit_sets(beam, _starts_with_one_more(beam, fitted, [dry]))
             beam.contact = _contact_values(beam, first[0]) if first else {}
-        tries = [t for one in still for t in _starts_with_one_more(beam, fitted, one)]
-        ends += _fit_sets(beam, tries)
+        ends += _fit_sets(beam, _starts_with_one_more(beam, fitted, still))
     if beam.best and not beam.open_outputs(beam.best):
         return
     wider = [one for one in screened if one not in plain]
-    others = [t for one in wider for t in _starts_with_one_more(beam, fitted, one)]
-    for end in ends:
-        others += [
-            t
-            for one in wider
-            for t in _starts_with_other_law(beam, end, end.effects[-1], one.effect)
-        ]
+    others = _starts_with_one_more(beam, fitted, wider)
+    for end, one in product(ends, wider):
+        others += _starts_with_other_law(beam, end, end.effects[-1], one.effect)
     others += _sets_with_other_law(beam, fitted, library)
     if len(fitted.effects) > 1:
         others += [*_sets_with_swap(beam, fitted, library), *_sets_without_one(fitted)]
@@ -446,11 +439,14 @@ def _candidates(
     ]
 
 
-def _starts_with_one_more(beam: Beam, fitted: Fit, one: Screened) -> list[Try]:
-    """Return the starts of a set with one effect more, new dry friction at `Beam.contact`."""
-    effects = (*fitted.effects, one.effect)
-    values = {**(beam.contact if one.effect.dry else {}), **fitted.values}
-    return [(effects, values | start, fitted) for start in one.starts]
+def _starts_with_one_more(beam: Beam, fitted: Fit, added: Sequence[Screened]) -> list[Try]:
+    """Return the starts of sets with one effect more, new dry friction at `Beam.contact`."""
+    tries = list[Try]()
+    for one in added:
+        values = {**(beam.contact if one.effect.dry else {}), **fitted.values}
+        effects = (*fitted.effects, one.effect)
+        tries += [(effects, values | start, fitted) for start in one.starts]
+    return tries
 
 
 def _contact_values(beam: Beam, fitted: Fit) -> Start:
@@ -473,7 +469,7 @@ def _sets_with_swap(beam: Beam, fitted: Fit, library: Sequence[Effect]) -> list[
         if rig is not None and same:
             base = replace(fitted, effects=rest, rig=rig)
             found = beam.screen.best(base, same, beam.worth(base, MOST), TRIES)
-            tries += [t for one in found for t in _starts_with_one_more(beam, base, one)[:1]]
+            tries += [t for one in found for t in _starts_with_one_more(beam, base, [one])[:1]]
     return tries
 
 

@@ -24,6 +24,7 @@ from typing import Any, Literal
 import numpy as np
 from scipy.optimize import lsq_linear
 
+from coupled.gap.noise.noise import rms_of
 from coupled.gap.signals.output import Floats, memory
 from coupled.gap.thresholds import (
     DAMPING_FACTOR,
@@ -109,10 +110,10 @@ class Slopes:
         if last is None or len(last.residual) != len(here):
             return None
         moved, step = here - last.residual, x - last.at
-        size = _rms(moved)
+        size = rms_of(moved)
         if not self._smooth or size <= TINY:
             return last.jacobian if size <= FEW else None
-        missed = _rms(moved - last.jacobian @ step)
+        missed = rms_of(moved - last.jacobian @ step)
         if self.corrections >= (2 * ROUNDS) or missed > ROUGH * size:
             return None
         change = np.outer(moved - last.jacobian @ step, step / float(step @ step))
@@ -122,7 +123,7 @@ class Slopes:
         return self.last.jacobian
 
     def _differences(self, x: Floats, here: Floats) -> Floats:
-        wanted = max(DIFFERENCE, self._share * _rms(here))
+        wanted = max(DIFFERENCE, self._share * rms_of(here))
 
         def column(i: int) -> Floats:
             if self._held is not None and not np.isnan(self._held[0, i]):
@@ -134,15 +135,11 @@ class Slopes:
             there[i] = value + (step if self._high[i] - value > step else -step)
             change = self._residual(there) - here
             most = 1.0 if self._smooth else 10.0
-            growth = np.clip(wanted / max(_rms(change), 1e-9), 0.1, most)
+            growth = np.clip(wanted / max(rms_of(change), 1e-9), 0.1, most)
             self._step[i] = float(np.clip(step * growth, *DIFFERENCE_STEPS))
             return np.asarray(change / (there[i] - value))
 
         return np.column_stack(in_threads(column, range(len(x))))
-
-
-def _rms(values: Floats) -> float:
-    return float(np.sqrt(np.mean(values**2)))
 
 
 @dataclass(frozen=True)

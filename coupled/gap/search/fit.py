@@ -23,11 +23,9 @@ at a bound.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from itertools import pairwise
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,6 +44,7 @@ from coupled.rig.rig import Rig
 
 Floats = NDArray[np.float64]
 Normal = tuple[float, float]  # mean and standard deviation
+Cost = Callable[[float], float]  # half a sum of squares by the value of one scaled parameter
 
 
 def fit_set(
@@ -213,15 +212,18 @@ def _fit(
     search, slope = _with_slopes(descent, keys, prior, rows, dry)
     best = prior.without(search.end(with_prior, firsts, (low, high), stepped, slope=slope))
 
-    def cost(at: float, k: int) -> float:
-        left = residual(_with(best.x, k, at))
-        return 0.5 * float(left @ left)
+    def cost_of(k: int) -> Cost:
+        def cost(at: float) -> float:
+            left = residual(_with(best.x, k, at))
+            return 0.5 * float(left @ left)
+
+        return cost
 
     for k in (k for k, p in enumerate(frees) if p.kind == "saturating"):
-        most = cost(float(high[k]), k)
+        most = cost_of(k)(float(high[k]))
         if most < best.cost:
             span = (float(best.x[k]), float(high[k]))
-            edge = _with(best.x, k, least_of(partial(cost, k=k), span, most))
+            edge = _with(best.x, k, least_of(cost_of(k), span, most))
             found = search.end(with_prior, [edge], (low, high), stepped)
             best = min(best, prior.without(found), key=lambda one: one.cost)
     free = _Free(keys, frees, scale, ends, ours, weights, frames)
@@ -237,7 +239,7 @@ def _fit(
     best = replace(best, slope=None if search.held is not None else _plain(best.slope, rows))
     number = [1000 * output.record + output.stretches[output.rows(part)] for output in ours]
     errors = _errors(ours, weights, part)
-    return _group(case, np.concatenate(number), free, best, prior, cost, errors)
+    return _group(case, np.concatenate(number), free, best, prior, cost_of, errors)
 
 
 def _errors(outputs: Sequence[Output], weights: Sequence[float], part: Part) -> Floats:
@@ -256,13 +258,6 @@ def _errors(outputs: Sequence[Output], weights: Sequence[float], part: Part) -> 
             for k in range(samples)
         ]
     )
-
-
-class Cost(Protocol):
-    """Half the sum of squares of a fit with another value of scaled parameter `k`."""
-
-    def __call__(self, at: float, k: int) -> float:
-        """Return half the sum of squares with the parameter at `at`."""
 
 
 @dataclass(frozen=True)
@@ -293,13 +288,13 @@ def _group(
     free: _Free,
     best: End,
     prior: _Priors,
-    cost: Cost,
+    cost_of: Callable[[int], Cost],
     errors: Floats,
 ) -> Group:
     """Return the values of a converged fit, with their intervals, and which are at a bound.
 
-    `stretches` are by row, `cost` is that with one parameter changed, `errors` are samples of the
-    inputs' error, shape (samples, rows).
+    `stretches` are by row, `cost_of` is the cost by the value of a numbered parameter, `errors` are
+    samples of the inputs' error, shape (samples, rows).
     """
     (low, high), scale = free.ends / free.scale, free.scale
     half = half_width(best, free.frames, stretches, prior.precision, errors) * scale
@@ -320,7 +315,7 @@ def _group(
     lower, upper = values - half, values + half
     for k in (k for k, p in enumerate(free.numbers) if p.kind == "saturating"):
         span, unit = (float(low[k]), float(high[k])), cost_of_unit_likelihood(best, free.frames)
-        open_one = open_above(partial(cost, k=k), float(best.x[k]), span, unit)
+        open_one = open_above(cost_of(k), float(best.x[k]), span, unit)
         if open_one is not None:
             values[k], lower[k], upper[k] = open_one[0] * scale[k], open_one[1] * scale[k], np.inf
             stuck[k] = False

@@ -17,7 +17,7 @@ from coupled.gap.search.case import Case
 from coupled.gap.search.course import Bounds, Course, course_of, course_of_events, timing_of
 from coupled.gap.search.found import Choice, Fit
 from coupled.gap.search.problem import Problem
-from coupled.gap.signals.output import Floats, explained_below, stage_limits
+from coupled.gap.signals.output import Floats, unexplained
 from coupled.gap.thresholds import ENDS, PARTLY, ROUNDS, WINDOW_s
 from coupled.record.record import Record
 
@@ -57,9 +57,8 @@ def _search_with_onset(
 
 def _open_outputs(case: Case, choice: Choice) -> set[str]:
     """Return the outputs of which the effects found leave more than noise and physics' error."""
-    first, limits = case.gaps(choice.without_effects.rig), stage_limits(case.outputs)
-    left = case.gaps(choice.fit.rig)
-    return {at for at, gap in left.items() if gap > explained_below(first[at], limits[at])}
+    first, left = case.gaps(choice.without_effects.rig), case.gaps(choice.fit.rig)
+    return unexplained(first, left, case.outputs)
 
 
 def _left(case: Case, choice: Choice) -> float:

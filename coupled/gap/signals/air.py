@@ -119,7 +119,7 @@ def _normal(record: Record) -> Floats:
 def _flow(record: Record) -> tuple[Floats, Floats, Floats]:
     """Return the shares of the airspeed ahead, to the right and up, in level axes by the heading.
 
-    Without a channel of sideslip or roll its angle is taken to be zero.
+    Without a channel of sideslip or roll its angle is zero.
     """
     alpha, pitch = record["alpha_rad"], record["pitch_rad"]
     beta, roll = _banked(record)

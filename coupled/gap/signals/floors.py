@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.gap.noise.noise import Noise, jumps, quiet_noise
+from coupled.gap.noise.noise import Noise, jumps, quiet_noise, rms_of
 from coupled.gap.noise.smooth import Corners, Rest, Smoother, rest_of
 from coupled.gap.signals.output import Floats, above_rounding, estimate_noise, rounding
 from coupled.gap.thresholds import FEW_FRAMES, SHORT_FRAMES, SIGMAS, TINY
@@ -32,7 +32,7 @@ def noise_in(rig: Rig, channel: str, signal: Floats) -> Noise:
 def given_noise(rig: Rig, channel: str, signal: Floats) -> Noise:
     """Return the noise of a channel in the rig file; by default the least that a sensor has."""
     known = rig.noise.get(channel, 0.0)
-    least = TINY * float(np.sqrt(np.mean(signal**2)))
+    least = TINY * rms_of(signal)
     return Noise(known or max(least, rounding(signal, np.inf)))
 
 
@@ -41,10 +41,10 @@ def left_noise(
 ) -> Noise:
     """Return a channel's noise from the residual of its stage; at least its rounding.
 
-    `estimated` is the noise estimated from the signal alone. It is kept for a filtered log, for a
-    short record, and if the residual is far larger: a signal that jumps elsewhere than predicted is
-    a gap, not noise. Frames that are not `judged` have no residual. The noise is estimated from the
-    others, and its rms taken over all frames; if no frame is judged, `estimated` is kept.
+    `estimated` is that from the signal alone. It is kept for a filtered log, a short record, and if
+    the residual is far larger: a signal that jumps elsewhere than predicted is a gap, not noise.
+    Frames that are not `judged` have no residual: the noise is estimated from the others, and its
+    rms taken over all frames.
     """
     rows = np.ones(len(left), dtype=bool) if judged is None else judged
     found = None if estimated.filtered else quiet_noise(left[rows])
@@ -57,8 +57,7 @@ def left_noise(
 def remove_projection(left: Floats, onto: Floats | None) -> Floats:
     """Return a residual without the part that repeats another channel's noise, same shape.
 
-    A host's product of δc as read contains the noise of that reading. It shows how the product is
-    computed and must not count as the product's own noise.
+    A host's product of δc as read contains the noise of that reading, and not as its own.
     """
     power = 0.0 if onto is None else float(onto @ onto)
     return left if onto is None or power == 0.0 else left - float(left @ onto) / power * onto
@@ -91,8 +90,8 @@ def floor_from(rig: Rig, channel: str, signal: Floats) -> str:
 def share_from_source(signal: Floats, made: Floats) -> tuple[float, float]:
     """Return the share of a signal's white noise that comes from its source, and the rest.
 
-    The share is of the noise's power, 0 to 1, the rest an rms. `made` is the signal computed with
-    the noise of its source; delays and filters of the source over some frames are allowed for.
+    The share is of power, 0 to 1, the rest an rms. `made` is the signal computed with the noise of
+    its source; delays and filters of the source over some frames are allowed for.
     """
     noise, rest = _regressed(signal, made, range(SHORT_FRAMES))
     return 1.0 - rest**2 / noise**2 if noise else 0.0, max(rest, rounding(signal, noise))
@@ -101,8 +100,8 @@ def share_from_source(signal: Floats, made: Floats) -> tuple[float, float]:
 def share_in_response(force: Floats, answer: Floats) -> float:
     """Return the share of a force's high-frequency power that its response shows, 0 to 1.
 
-    A response shows what is signal in the force, not noise. Fourth differences of the force are
-    regressed on those of the response about the same frame, without a model between them.
+    It is signal, not noise. Fourth differences of the force are regressed on those of the response
+    about the same frame, without a model between them.
     """
     half = FEW_FRAMES // 2
     noise, rest = _regressed(force, answer, range(-half, half + 1))
@@ -136,21 +135,20 @@ class Drive:
     def of(cls, signal: Floats, noise: Noise, with_corners: bool = False) -> Drive:
         """Return a signal smoothed, and held constant at rest; unchanged if it has no noise.
 
-        It is also unchanged if the smoother would remove far more than its noise, since that is
-        signal, for example of a hand that moves in steps.
+        Also if the smoother would remove far more than noise, as of a hand that moves in steps.
         """
         rest = rest_of(signal, noise)
         smoother = Smoother.of(signal, noise=noise, with_corners=with_corners)
         smooth = rest.held(smoother.smooth(signal)) if noise.rms else signal
         made = cls(signal, smooth, noise, rest, smoother.corners)
-        taken = float(np.sqrt(np.mean((signal - smooth) ** 2)))
+        taken = rms_of(signal - smooth)
         return made.unsmoothed(noise) if taken > SIGMAS * noise.rms else made
 
     def on_nodes(self, rig: Rig, samples: Floats, otherwise: bool = False) -> Floats:
         """Return this signal, or one with other errors, on the loader's nodes.
 
-        Corners are joined by straight lines, beside which a spline would ring. `otherwise`: what
-        jumps beside them is interpolated more coarsely, for the error of the interpolation.
+        Corners are joined by straight lines, beside which a spline would ring. `otherwise`: jumps
+        beside them are interpolated more coarsely, for the error of the interpolation.
         """
         rest = samples - self.corners.over(np.arange(len(samples), dtype=np.float64))
         at = np.arange((len(samples) - 1) * rig.substeps + 1) / rig.substeps

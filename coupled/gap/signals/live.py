@@ -1,13 +1,11 @@
 """The parts of a live record that can be judged: by validity, the loader's clock and switches.
 
 A host continues if a sample of the loader does not arrive, so a row may repeat an older sample.
-Samples are taken at times of the loader's own clock, which differ from the frames. The measured
-signals are therefore resampled to equal steps of that clock. Short gaps are interpolated; rows in
-long gaps are left out. Rows with faded forces, and rows with other hardware than at the start, are
-left out too. After a gap a replay restarts from the measured state.
-
-Other recorders fill a dropout with the last row. A row that repeats all readings of the controls,
-whose noise cannot repeat by chance, is therefore no new sample of any record.
+Samples are taken at times of the loader's own clock, so the measured signals are resampled to equal
+steps of that clock. Short gaps are interpolated; rows in long gaps, with faded forces, or with
+other hardware than at the start are left out. After a gap a replay restarts from the measured
+state. In any record, a row that repeats all readings of the controls, whose noise cannot repeat by
+chance, is a filled dropout and no new sample.
 
 K̂ and the corrections may change in flight, by a switch or by adaptation in service. The manifest
 lists the changes (`live.switched`, `live.adapted`), and the host's equations are replayed with the
@@ -154,10 +152,7 @@ def judged_part(record: Record, file: object) -> Record:
 
 
 def _validity(record: Record, live: Mapping[str, Any]) -> Floats | None:
-    """Return each row's validity; without that channel, from the spells without an answer.
-
-    Without either, rows that repeat the row before have no new sample. None if there are none.
-    """
+    """Return each row's validity, else by the spells without an answer, else by repeated rows."""
     if VALIDITY in record:
         return record[VALIDITY]
     spells = live.get("spells") or []
@@ -262,10 +257,7 @@ class _Clock:
             self.at[rows[part]] += away[part] - drift(rows[part])
 
     def resampled(self, signal: Floats, sampled: Mask, received: Mask) -> Floats:
-        """Return a signal at equal steps of the clock.
-
-        Rows that are not `received` are interpolated linearly.
-        """
+        """Return a signal at equal steps of the clock, linear in rows that are not `received`."""
         rows = np.flatnonzero(sampled)
         if len(rows) < 4:
             return signal

@@ -84,10 +84,7 @@ def times_missed(record: Record) -> Floats:
 
 
 def spread_of_missed(rig: Rig, record: Record) -> float:
-    """Return the relative sampling error of the share of missed frames.
-
-    For n frames missed at random it is √((1 − share)/n).
-    """
+    """Return the relative sampling error of the share of missed frames, √((1 − share)/n) of n."""
     missed = missed_in(record)
     count = int(np.sum(missed.seen))
     return math.sqrt((1.0 - missed.share) / count) if count else 0.0

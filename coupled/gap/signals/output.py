@@ -10,14 +10,14 @@ the same: it is used to screen effects (`change`).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.gap.noise.noise import Noise, noise_of
+from coupled.gap.noise.noise import Noise, noise_of, rms_of
 from coupled.gap.thresholds import (
     FAULTY_FROM,
     FEW_STRETCHES,
@@ -60,11 +60,11 @@ _KEPT = 8  # size of the cache of residuals; threads fit different effects at on
 class HiddenGap:
     """A noise floor that may hide a gap: `share` is the floor over the channel's motion, both rms.
 
-    `most` is the largest share that hides no large gap. It is larger for the airframe, of which a
-    gentle flight has hardly ten floors of motion.
-    `noisiest` is the channel whose noise dominates the floor, `channel` that of the output.
-    `misses` is the gap of the healthy records, if the floor includes a model error; else 0.
-    `coloured` is a gap that noise of the input may cause, if its colour is too uncertain; else 0.
+    `most` is the largest share that hides no large gap; it is larger for the airframe, of which a
+    gentle flight has hardly ten floors of motion. `noisiest` is the channel whose noise dominates
+    the floor, `channel` that of the output. `misses` is the gap of the healthy records, if the
+    floor includes a model error; `coloured` a gap that noise of the input may cause, if its colour
+    is too uncertain; else 0.
     """
 
     share: float
@@ -166,7 +166,7 @@ class Output:
         """
         stepped = replace(self, stepped=True)
         change = stepped.residual(rig, coarse=True) - stepped.residual(rig)
-        return float(np.sqrt(np.mean(change**2))) < PARTLY
+        return rms_of(change) < PARTLY
 
     def residual(
         self, rig: Rig, part: Part = "all", coarse: bool = False, rough: bool = False
@@ -236,8 +236,7 @@ class Output:
     def halved(self, rig: Rig) -> Output:
         """Return the output with halves of about equal power of this rig's residual.
 
-        A rare event, such as a limit reached once, would otherwise be in one half only: a stretch
-        with much of the residual's power is divided.
+        Stretches with much of it are divided: a rare event would otherwise be in one half only.
         """
         frames = stretch_of(len(self.measured), self.frame_rate_Hz)
         least = max(1, round(PIECE_s * self.frame_rate_Hz))
@@ -282,14 +281,14 @@ class Output:
     def samples(self, left: Floats) -> float:
         """Return the effective samples of a residual: its frames over its autocorrelation time.
 
-        That time is at least the autocorrelation time of the noise floor. A small part of the
-        noise, such as the drift after a wrong restart, may last long, and be fitted by effects.
+        That is at least the noise floor's: a small part of the noise, as the drift after a wrong
+        restart, may last long, and be fitted by effects.
         """
         return len(left) / max(memory(left), self.lasts)
 
     def gap(self, rig: Rig) -> float:
         """Return the rms residual over the floor."""
-        return float(np.sqrt(np.mean(self.residual(rig) ** 2)))
+        return rms_of(self.residual(rig))
 
 
 def stretch_of(frames: int, rate_Hz: float) -> int:
@@ -333,11 +332,9 @@ def spread(
     """Return the relative standard deviation of the rms of noise.
 
     `carried` are samples of propagated input noise. The own noise is white, or correlates by
-    `memory` from frame to frame. If a stage passes noise in a part of the record only, for example
-    while nothing else moves, only that part counts.
-
-    The mean square of N values of Gaussian noise has the relative standard deviation √(2·Σρ²/N)
-    (Bartlett), its root half of that.
+    `memory` from frame to frame. If a stage passes noise in a part of the record only, only that
+    part counts. The mean square of N values of Gaussian noise has the relative standard deviation
+    √(2·Σρ²/N) (Bartlett), its root half of that.
     """
     power = np.mean([np.abs(np.fft.rfft(x)) ** 2 for x in carried], axis=0) / len(carried[0])
     crowded = 1.0 + 1.0 / len(carried)  # bias of a squared periodogram averaged over few samples
@@ -374,11 +371,16 @@ def memory(residual: Floats) -> float:
 
 
 def explained_below(before: float, limit: float) -> float:
-    """Return the largest gap of an explained stage, from its gap without effects.
-
-    `limit` is the largest gap of noise alone.
-    """
+    """Return the largest gap of an explained stage, by those without effects and of noise."""
     return max(limit, 1.0 + MISMATCH * (before - 1.0))
+
+
+def unexplained(
+    before: Mapping[str, float], left: Mapping[str, float], outputs: Sequence[Output]
+) -> set[str]:
+    """Return the outputs whose gap that is left exceeds that of an explained stage."""
+    limits = stage_limits(outputs)
+    return {at for at, gap in left.items() if gap > explained_below(before[at], limits[at])}
 
 
 def stage_limits(outputs: Sequence[Output]) -> dict[str, float]:

@@ -93,10 +93,7 @@ class Sensed:
         return self._unread(nodes)
 
     def both(self, computed: Floats, recorded: Floats, read: Floats) -> tuple[Floats, Floats]:
-        """Return δc on the nodes and F at the frames from their readings.
-
-        `read` is δc as recorded, which gives the phase of the hum.
-        """
+        """Return δc on the nodes and F at the frames from readings; `read`: δc at frames."""
         hum = self.hum(read)
         still = computed - (on_nodes(self.rig, hum) if isinstance(hum, np.ndarray) else hum)
         true = self.curve.inverse(still / self.scale(len(computed), self.rig.substeps))
@@ -221,10 +218,7 @@ class Reading:
         return stamped_as
 
     def regressor(self) -> Floats | None:
-        """Return the channel on which force and friction depend, less its reference, in its unit.
-
-        None if the rig file names no channel.
-        """
+        """Return the channel on which force and friction depend, less its reference, or None."""
         loader = self.rig.controls[self.control].loader
         if loader.regressor is None:
             return None
@@ -237,7 +231,7 @@ class Reading:
     def others(self, as_read: bool = False) -> dict[str, Floats]:
         """Return the forces in N on other controls of a common structure, if recorded.
 
-        As the host read them, or smoothed, of a live loader at equal steps of its clock.
+        `as_read` by the host, or smoothed; of a live loader at equal steps of its clock.
         """
         if self.rig.structure.stands_apart:
             return {}
@@ -337,9 +331,9 @@ class Reading:
         return self.rig.controls[self.control].schedule
 
     def _feel_from(self) -> list[str]:
-        """Return the channel that the loader's feel needs: q̄ if there are several segments.
+        """Return the channel that the loader's feel needs; none if the feel is the same at any q̄.
 
-        Else that of G_T, for which q̄ may stand. Empty if the feel is the same at any q̄.
+        It is q̄ for several segments, else G_T, which q̄ may replace.
         """
         own = self.name_of("gradient")
         if is_constant(self.schedule):
@@ -351,7 +345,7 @@ class Reading:
     def services(self) -> ServiceRows | None:
         """Return the rows of trim, autopilot and stick pusher; None if the record has none.
 
-        They are no effect, and act in the replay as recorded, in the stages on which they acted.
+        They act in the replay as recorded, and are no effect.
         """
         return service_rows(self.record, self.control)
 
@@ -408,14 +402,14 @@ class Reading:
 def drifts(rig: Rig, control: ControlName, gradient: float) -> bool:
     """Tell whether a prediction from the force would drift, for lack of a spring.
 
-    True if the loader's own period exceeds `SHORTEST_RECORD_s` at a gradient in N/d.
+    Then the loader's own period exceeds `SHORTEST_RECORD_s` at a gradient in N/d.
     """
     mass = rig.controls[control].loader.mass
     return max(gradient, 0.0) * SHORTEST_RECORD_s**2 < 4.0 * np.pi**2 * mass
 
 
 def softest_gradient(rig: Rig, control: ControlName, record: Record) -> float:
-    """Return a record's least gradient, N/d: as recorded, from its q̄, or the table's least.
+    """Return a record's least gradient, N/d: as recorded, else from its q̄, else the table's.
 
     Of a curve, that of its softest segment.
     """

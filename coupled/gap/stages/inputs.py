@@ -3,35 +3,30 @@
 Residual noise of an input makes backlash and friction creep. A backlash keeps the extremes of its
 input. While friction holds the loader still, the smoothed δc still contains noise; each maximum of
 it moves the grip's side of the backlash. A fit then finds the backlash too large, by 1 % of 0.8 mm
-at 20 μm of noise. Friction with presliding creeps likewise while the force rests: each noise peak
-of F makes the contact slip a little. Where the force is found to rest completely it is held
-constant (`smooth`).
+at 20 μm of noise. Friction with presliding creeps likewise: each noise peak of F makes the contact
+slip a little. Where the force rests completely it is held constant (`smooth`).
 
 The creep grows with the noise. The stage is replayed with as much noise again, in both signs, so
 that linear contributions cancel, and the change is extrapolated to zero noise (SIMEX: Cook and
-Stefanski, JASA 89, 1994). Noise may be too small for a creep that √2 times as much would cause.
-Then the record does not show the creep, and the correction is not applied.
+Stefanski, JASA 89, 1994). The correction is not applied if the record does not show the creep.
 
-With imposed motion, as on a damper test bench, the force is the output. The imposed motion is that
-of the grip if recorded, else δc. The measured force is compared with the loader's reaction
+With imposed motion, as on a damper test bench, the force is the output. The motion is that of the
+grip if recorded, else δc. The measured force is compared with the loader's reaction
 (`rig.imposed`). Structure (which bends under the measured force), servo and backlash lie between
-grip and loader.
+grip and loader. The grip takes up a rigid backlash on the side of the force,
+δ = x + sgn(F)·play/2 + bend(F). Within the backlash the force is zero and δ is arbitrary.
 
 A record of F and δ without δc has loader and linkage in series:
 
     F → loader → δc → servo, play → + bend(F) → δ
 
-The loader's response to the measured force is predicted, and drives the linkage; the predicted
-reading of the transducer at the grip is compared with the record. All effects of loader and linkage
-show in this one output. A static record gives one number only, the slope of δ over F,
+The predicted reading of the transducer at the grip is compared with the record. All effects of
+loader and linkage show in this one output. A static record gives one number only, the slope
 
     dδ/dF = 1/(G_B + ΔG) + K
 
 so a bend, a gradient and a force scale are not separable. The loader's mass and damping make them
 separable if the force excites both.
-
-On a bench that imposes the motion, the grip takes up a rigid backlash on the side of the force, δ =
-x + sgn(F)·play/2 + bend(F). Within the backlash the force is zero and δ is arbitrary.
 """
 
 from __future__ import annotations
@@ -76,10 +71,7 @@ def without_backlash_creep(rig: Rig, control: ControlName, at: Driven, measured:
 def without_friction_creep(
     rig: Rig, control: ControlName, at: Driven, measured: Floats, times: float = 1.0
 ) -> Floats:
-    """Return a loader's response without noise-induced creep of presliding friction.
-
-    The force contains `times` the noise that the smoother passes.
-    """
+    """Return a loader's response without creep of presliding friction by `times` its noise."""
     may_creep = rig.controls[control].loader.friction_stiffness != 0.0 and is_dry(rig, control)
     return _without_creep(rig, at, measured, times) if may_creep else at(rig, 0.0)
 
@@ -87,8 +79,8 @@ def without_friction_creep(
 def creeps(rig: Rig, control: ControlName, at: Driven, noise: float) -> bool:
     """Tell whether noise of the force makes presliding friction creep by more than it vibrates.
 
-    Tested with the filed friction, or a little if none is filed, and a usual presliding length.
-    `noise` is the noise of δc, rms in d.
+    With the filed friction, or a little if none is filed, and a usual presliding length. `noise`
+    is that of δc, rms in d.
     """
     loader = rig.controls[control].loader
     level = max(loader.friction, loader.breakaway) or CREEP_FRICTION_N
@@ -105,9 +97,9 @@ def creeps(rig: Rig, control: ControlName, at: Driven, noise: float) -> bool:
 def _without_creep(rig: Rig, at: Driven, measured: Floats, times: float = 1.0) -> Floats:
     """Return a response without creep, from two responses with `times` the noise in addition.
 
-    The predicted creep is removed unless this increases the mean square residual. Between the two
-    shares of `CREEP_WORSE` it is removed in part. A fitted backlash absorbs a small creep, so that
-    the residual does not show it.
+    The predicted creep is removed unless this increases the mean square residual, and in part
+    between the two shares of `CREEP_WORSE`: the residual does not show a creep that a fitted
+    backlash absorbs.
     """
     plain, up, down = in_threads(partial(at, rig), (0.0, times, -times))
     push = RATCHET * (plain - 0.5 * (up + down))
@@ -172,10 +164,7 @@ def under_motion(reading: Reading) -> tuple[Predict, Noisy, NDArray[np.bool_]]:
 
 
 def _within_rests(predicted: Floats, measured: Floats, least: Floats, most: Floats) -> Floats:
-    """Return a prediction that at rest is the force measured, if friction can hold it.
-
-    Beyond its noise: what friction cannot hold is a misfit.
-    """
+    """Return a prediction that at rest is the force measured, as far as friction can hold it."""
     held = np.clip(measured, np.minimum(least, most), np.maximum(least, most))
     return np.where(most != least, held, predicted)
 
@@ -183,8 +172,8 @@ def _within_rests(predicted: Floats, measured: Floats, least: Floats, most: Floa
 def _within_jumps(predicted: Floats, measured: Floats, jumps: NDArray[np.bool_]) -> Floats:
     """Return a prediction with a small weight where the force jumps within a frame.
 
-    A backlash that closes within a frame gives a sample between the forces before and after. Only
-    the share `LESSER` of the difference counts, which still guides a fit.
+    A backlash that closes within it gives a sample between the forces before and after. A share
+    `LESSER` of the difference still guides a fit.
     """
     around = np.stack((np.roll(predicted, 1), np.roll(predicted, -1)))
     held = np.clip(measured, around.min(axis=0), around.max(axis=0))

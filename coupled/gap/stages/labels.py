@@ -35,8 +35,7 @@ def check_labels(
 ) -> None:
     """Raise InputError if a reversed channel, or two exchanged ones, explain a record's gap.
 
-    They do if without them the model predicts each channel better than rest does, and the gap is
-    far smaller.
+    Then, corrected, the model predicts each channel better than rest does, and the gap is small.
     """
     for reader, file in zip(readers, files, strict=True):
         own = [one for one in outputs if one.record == reader.number and one.channel in COMPARED]

@@ -22,7 +22,7 @@ from functools import cached_property, partial
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.gap.noise.noise import Noise, between_jumps
+from coupled.gap.noise.noise import Noise, between_jumps, rms_of
 from coupled.gap.noise.smooth import Smoother, rate_of, smoothed
 from coupled.gap.signals.conditions import reach_of, trim_shift
 from coupled.gap.signals.floors import (
@@ -95,10 +95,7 @@ class Reader(Reading):
     """Builds the outputs that a record allows, and lists missing channels."""
 
     def outputs(self) -> list[Output]:
-        """Return every output that the record allows, in the order of the chain.
-
-        An aircraft alone has none of these stages; the airframe's are made by `airframe_outputs`.
-        """
+        """Return every output that the record allows, in the order of the chain; no airframe's."""
         if not self.rig.controls:
             return []
         lacking = self.missing()
@@ -135,16 +132,16 @@ class Reader(Reading):
     ) -> Output:
         """Return an output whose floor is its own noise and its input's, propagated.
 
-        The prediction of frames that are not `judged` is the measurement. For an output that is
-        `driven_by` a quantity of the control, `hidden_gap` is set. `between` is the rms error of
-        the prediction because the inputs between frames are unknown. The part of the residual that
-        is proportional to `correlated` does not count as noise.
+        The prediction of frames that are not `judged` is the measurement. For an output `driven_by`
+        a quantity of the control, `hidden_gap` is set. `between` is the rms error of the prediction
+        because the inputs between frames are unknown. The part of the residual that is
+        proportional to `correlated` does not count as noise.
         """
         name, measured = self.name_of(quantity), self.signal(quantity)
         base = predict(self.rig)
         own = left_noise(own, measured, remove_projection(measured - base, correlated), judged)
         tries = in_threads(lambda k: noisy(self.rig, k) - base, range(TRIES))
-        carried = _rms(np.array(tries))
+        carried = rms_of(np.array(tries))
         known = REPLAY_KNOWN * float(np.ptp(measured))
         floor = math.hypot(own.rms, carried, between, known)
         made = self._output(stage, name, measured, predict, floor)
@@ -254,7 +251,7 @@ class Reader(Reading):
         walks = force.smooth is not force.recorded
         walks = walks and creeps(self.rig, self.control, answer, own.rms)
         otherwise = driven(force.smooth, smooth, otherwise=True)(self.rig, 0.0)
-        given = ("force", _rms(otherwise - answer(self.rig, 0.0)), self.judged)
+        given = ("force", rms_of(otherwise - answer(self.rig, 0.0)), self.judged)
         whole = self._made("loader", "computed", predicted(answer), noisy, own, *given)
         whole = whole.under(force.noise)
         if not restarted:
@@ -272,7 +269,7 @@ class Reader(Reading):
         for times in (1, 2, 4):
             starts = self._restarts(round(times * PIECE_s * self.rig.frame_rate))
             more = moved((1.0 + SMALL) * force, starts) - moved(force, starts)
-            if _rms(more) > SIGMAS * noise:
+            if rms_of(more) > SIGMAS * noise:
                 return starts
         return self._restarts(round(STRETCH_s * self.rig.frame_rate))
 
@@ -336,24 +333,24 @@ class Reader(Reading):
     def repeats_product(self) -> bool:
         """Whether F_mod was computed from δc as read: its only noise is that of δc.
 
-        A measured F_mod of an analog multiplier has noise of its own. A computed
-        F_mod cannot discriminate the multipliers; the motion of the loader can.
+        Then the motion of the loader discriminates the multipliers, but not F_mod.
         """
         analog = self.rig.controls[self.control].loader.multiplier != "digital"
         if not analog or self.moved or self.set_points or "multiplier" in self.missing():
             return False
         computed = self.as_read("computed")
         product = self._product(computed)
-        repeated = _rms(product - self._product(smoothed(computed)))
-        return repeated > 0.0 and _rms(self.signal("modifying_force") - product) < MINOR * repeated
+        repeated = rms_of(product - self._product(smoothed(computed)))
+        left = rms_of(self.signal("modifying_force") - product)
+        return repeated > 0.0 and left < MINOR * repeated
 
     def _multiplier(self) -> list[Output]:
         """Return F_mod, predicted by the product of δc itself, or of δc as read.
 
         A digital product contains the sensor noise and scale error of δc, an analog product does
         not. The part of F_mod that repeats the noise of δc (`correlated`) is therefore not the
-        channel's own noise: included in the noise floor, it would hide whether the product is
-        digital. There is no output if that is all of its noise (`repeats_product`).
+        channel's own noise: in the noise floor, it would hide whether the product is digital. There
+        is no output if that is all of its noise (`repeats_product`).
 
         At the breakout the product jumps. Frames in which noise of δc decides the sign of a jump
         are not judged: the prediction there is the measurement. A jump below the noise of F_mod
@@ -416,7 +413,7 @@ class Reader(Reading):
             return driven(command.with_error(k), force.with_error(k + TRIES))(rig)
 
         given, predict = (command.smooth, force.smooth), driven(command.smooth, force.smooth)
-        between = _rms(driven(*given, otherwise=True)(self.rig) - predict(self.rig))
+        between = rms_of(driven(*given, otherwise=True)(self.rig) - predict(self.rig))
         made = (predict, noisy, self.channel_noise("deflection"), "computed", between)
         linkage = self._made("linkage", "deflection", *made, self.judged)
         # A bend adds to δc; with set points the whole motion is the servo's.
@@ -476,16 +473,11 @@ class Reader(Reading):
         return [self._output("surface", surface, measured, predict, floor)]
 
 
-def _rms(signal: Floats) -> float:
-    """Return the root of a signal's mean square."""
-    return float(np.sqrt(np.mean(np.square(signal))))
-
-
 def _with_motion(computed: Floats, smooth: Floats, level: Noise) -> Floats:
     """Return the estimate of δc, d: smoothed, plus the motion's share of what the smoother removes.
 
-    For a fast motion with little noise that share is large. Without it, an analog product, which
-    contains the whole motion, would seem to repeat the noise of δc.
+    It is large for a fast motion with little noise. Without it, an analog product, which contains
+    the whole motion, would seem to repeat the noise of δc.
     """
     rest = computed - smooth
     noise = level.sample(len(rest), np.random.default_rng(53))

@@ -6,12 +6,12 @@ motion too. The input is then the host's command, flown through the model's laws
 stage is not judged. Without a command in the record, the surface is led to where it was measured.
 
 A record starts in trim. A surface that differs from the model's trim by more than noise has one of
-two causes. If the aircraft trims elsewhere (other weight, lift or moment), the first row is
-there too, and the aircraft stays in trim. If something moved the surface afterwards (a rigging
-offset), the aircraft responds. The two are compared by the first row, and by the model's residual
-in open-loop flight. If the first row excludes each alone, both causes are present. If the two
-cancel from the second row on, the flight must confirm them as well. Without evidence the aircraft's
-trim is assumed; for a record without motion, a fault of the surface.
+two causes. If the aircraft trims elsewhere (other weight, lift or moment), the first row is there
+too, and the aircraft stays in trim. If something moved the surface afterwards (a rigging offset),
+the aircraft responds. The first row and the model's residual in open-loop flight decide. If the
+first row excludes each alone, both causes are present; if they cancel from the second row on, the
+flight must confirm them. Without evidence the aircraft's trim is assumed; for a record without
+motion, a fault of the surface.
 
 The trim is also an output that is compared with the model's trim. With the angle of attack in trim
 it discriminates lift, moment and weight.
@@ -129,10 +129,7 @@ def _aircraft(
 def _moves_itself(
     airframe: JSBSimAirframe, controls: Sequence[ControlName], rate_Hz: float, control: ControlName
 ) -> bool:
-    """Tell whether a surface moves with gusts or other controls.
-
-    Also true if it still moves one frame after its own command, as with an actuator in the model.
-    """
+    """Tell whether a surface moves with gusts or other controls, or after its command's frame."""
     at = motion_channels(controls, flown=True).index(surface_channel(control))
     own, frames = controls.index(control), round(BRIEF_s * rate_Hz)
 
@@ -308,7 +305,7 @@ def trim_of(rig: Rig, record: Record, control: ControlName) -> Trim | None:
 
 
 def start_of(position: Floats, noise: float) -> tuple[float, float]:
-    """Return a channel's value in the first row, as a surface's position, and its standard error.
+    """Return a channel's value in the first row, and its standard error.
 
     From the rows before it moves by more than noise: their mean, or the start of a parabola if that
     improves the fit.
@@ -326,10 +323,9 @@ def start_of(position: Floats, noise: float) -> tuple[float, float]:
 
 
 def _trimmed(rig: Rig, record: Record, control: ControlName, near: float) -> tuple[float, float]:
-    """Return a surface's position in the trim of an aircraft that trims `near` it, and its error.
+    """Return a surface's position, rad, in the trim of an aircraft `near` that, and its error.
 
-    A command moves the surface from there, by another amount than from the model's own trim if the
-    surface's travels are unequal. Both in rad.
+    With unequal travels, a command moves the surface otherwise than from the model's own trim.
     """
     found, error = near, math.inf
     for _ in range(ROUNDS):
@@ -345,10 +341,9 @@ def _standing_off(
     """Return a surface's initial offset from a trim and command, and its standard error, rad.
 
     Shortfall and lag behind the command are fitted too; if the command moves at once, they would
-    imitate another trim. The offset is estimated over the longest of `STANDING_s` from the record's
-    start whose residual is noise alone: with play or a dead zone the residual is larger. If it is
-    larger for each of these times, the shortest is used. Return None if the record does not have
-    the command.
+    imitate another trim. The offset is over the longest of `STANDING_s` from the record's start
+    whose residual is noise alone (with play or a dead zone it is larger), or over the shortest.
+    None if the record does not have the command.
     """
     estimate, pressure = channel(control, "estimate"), "dynamic_pressure_Pa"
     points = surface_points(rig, control)
@@ -374,11 +369,10 @@ def _standing_off(
 def _constant(left: Floats, ordered: Floats, noise: float) -> tuple[tuple[float, float], float]:
     """Return the constant part of a surface's deviation with its standard error, and what is left.
 
-    All in rad, the last as rms. `ordered` is the motion by the command. A share of it and of its
-    rate are fitted beside the constant. If they do not improve the fit and the constant is
-    significant, it is estimated by the mean, which is more precise. It is significant in that fit,
-    or from the rows before the command has moved the surface by a quarter of it, since a lag is no
-    larger than its command.
+    All in rad, the last as rms. A share of the motion by the command, `ordered`, and of its rate
+    are fitted beside the constant. If they do not improve the fit and the constant is significant,
+    it is the mean, which is more precise. It is significant in that fit, or from the rows before
+    the command has moved the surface by a quarter of it, since a lag is no larger than its command.
     """
     answers = np.column_stack([ordered, np.gradient(ordered)])
     answers /= np.maximum(np.linalg.norm(answers, axis=0), 1e-300)
@@ -405,10 +399,7 @@ def _constant(left: Floats, ordered: Floats, noise: float) -> tuple[tuple[float,
 def _followed(
     rig: Rig, record: Record, control: ControlName, one: Trim, other: Trim
 ) -> float | None:
-    """Return twice the log-likelihood gain of the `other` trim over the `one`.
-
-    None if the record does not have the motion.
-    """
+    """Return twice the log-likelihood gain of the `other` trim; None without the motion."""
     rows = min(len(record), round(FLIGHT_s * rig.frame_rate))
     short = Record(record.channels, record.data[:rows], record.manifest)
     weighed = WEIGHED if control == "column" else _LATERAL

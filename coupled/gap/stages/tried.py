@@ -50,7 +50,7 @@ from coupled.gap.thresholds import (
     SIGMAS,
     SMALL,
 )
-from coupled.record.channels import LATERAL, ControlName, channel, unit_of
+from coupled.record.channels import LATERAL, ControlName, channel, motions_in, unit_of
 from coupled.record.record import Record
 from coupled.resources import aircraft_folder
 from coupled.rig.rig import Rig
@@ -108,11 +108,10 @@ def _turns_far(readers: Sequence[Reader]) -> bool:
     if unit_of(readers[0].control) != "rad":
         return False
     for reader in readers:
-        names = (reader.name_of(quantity) for quantity in ("computed", "deflection"))
-        name = next((name for name in names if name in reader.record), None)
-        if name is None:
+        moved = motions_in(reader.record, reader.control)
+        if not moved:
             continue
-        way = smoothed(reader.record[name])
+        way = smoothed(reader.record[moved[0]])
         waves = np.column_stack((np.sin(way), np.cos(way)))
         waves -= waves.mean(axis=0)
         line = (way - way.mean()) / np.linalg.norm(way - way.mean())
@@ -193,11 +192,9 @@ def _plays(
 ) -> list[dict[str, float]]:
     """Return the backlashes with the least residual of the force, where a fit starts, by scans.
 
-    With each stiffness from which a contact starts, if the effect has one.
-
-    The cost has local minima, since the jumps of a backlash move from sample to sample. The force
-    is scanned once as the rig predicts it, and once with a free factor and offset: with an unknown
-    damping the prediction may be far off.
+    With each stiffness from which a contact starts, if the effect has one. The cost has local
+    minima, since the jumps of a backlash move from sample to sample. The force is scanned as the
+    rig predicts it, and with a free factor and offset: by an unknown damping it may be far off.
     """
     number, *contact = effect.free
     ours = [output for output in outputs if output.stage == "loader"]
@@ -254,10 +251,7 @@ def _under_set_points(
 
 
 def _reached(grip: Floats, record: Record) -> float:
-    """Return the speed in d/s that the grip surely reached, over a few frames, beyond its noise.
-
-    A play only makes it slower than the servo; a bend would add to it, but is not considered.
-    """
+    """Return the speed, d/s, that the grip surely reached over a few frames, without a bend."""
     rate_Hz = (len(grip) - 1) / float(record.time_s[-1] - record.time_s[0])
     noise = 2.0 * SIGMAS * white(grip)  # of the two ends of a way
     over = [n for n in REACHED_OVER if n < len(grip)]
@@ -268,8 +262,7 @@ def _reached(grip: Floats, record: Record) -> float:
 def with_terms(library: Sequence[Effect], rig: Rig, records: Mapping[str, Record]) -> list[Effect]:
     """Return a library with the model's functions in place of effects of the aerodynamics.
 
-    Raises InputError for a model without named functions, and for a record without channels that
-    the airframe needs.
+    Raises InputError without named functions, or without channels that the airframe needs.
     """
     assert rig.flight is not None
     axes = functions_of(main_file(rig.flight, [aircraft_folder()], rig.place))

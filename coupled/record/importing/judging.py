@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.errors import InputError
-from coupled.record.channels import CONTROL_NAMES, TIME, channel
+from coupled.record.channels import CONTROL_NAMES, TIME, channel, motions_in
 from coupled.record.importing import plausible
 from coupled.record.importing.redundant import feel_pressure, other_units, reversed_rates
 from coupled.rig.equations import specified_gradient
@@ -103,8 +103,7 @@ def _by_others(record: Mapping[str, Floats], rig: Rig | None, file: object) -> d
         own = [name for name in record if name.startswith(f"{control}_")]
         if rig is not None and data is None and own:
             raise InputError(file, own[0], f"the rig has no {control}")
-        moved = [channel(control, q) for q in ("computed", "deflection")]
-        moved = [name for name in moved if name in record]
+        moved = motions_in(record, control)
         for name in moved:
             if data is not None:
                 _add(doubts, name, _travel(name, record[name], data, file))

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.record.channels import ATTITUDE, RATE, TIME, ControlName, channel
+from coupled.record.channels import ATTITUDE, RATE, TIME, ControlName, channel, motions_in
 from coupled.record.importing import plausible
 from coupled.rig.equations import specified_force, specified_gradient
 from coupled.rig.parameters import Control
@@ -147,17 +147,12 @@ def _spring_ratio(
 
     At δ if the rig compensates its bend, or else at δc.
     """
-    force, moved = channel(control, "force"), _moved(channels, control)
+    force, moved = channel(control, "force"), motions_in(channels, control)
     if force not in channels or not moved:
         return None
     compensated = rig.controls[control].compensation
     spring = specified_force(rig, control, pressure, channels[moved[-compensated.gradient]])
     return plausible.force_ratio(channels[force], spring, np.ones(1))
-
-
-def _moved(channels: Channels, control: ControlName) -> list[str]:
-    names = (channel(control, quantity) for quantity in ("computed", "deflection"))
-    return [name for name in names if name in channels]
 
 
 def _by_attitude(channels: Channels) -> dict[str, OtherUnit]:
@@ -233,7 +228,7 @@ def force_unit(channels: Channels, rig: Rig, control: ControlName) -> OtherUnit 
     """
     data = rig.controls.get(control)
     force, gradient = (channel(control, quantity) for quantity in ("force", "gradient"))
-    moved = _moved(channels, control)
+    moved = motions_in(channels, control)
     if data is None or force not in channels or not moved:
         return None
     ratio, source = None, "the rig"
@@ -273,7 +268,7 @@ def feel_pressure(channels: Channels, data: Control) -> Floats | None:
 
 def _bend_ratio(channels: Channels, control: ControlName, data: Control) -> float | None:
     """Return the force's unit by the bend: K of the rig over that of the record."""
-    moved = [channels[name] for name in _moved(channels, control)]
+    moved = [channels[name] for name in motions_in(channels, control)]
     if len(moved) < 2 or data.loader.bend == 0.0:
         return None
     slope = plausible.bend_slope(channels[channel(control, "force")], *moved)
@@ -282,7 +277,7 @@ def _bend_ratio(channels: Channels, control: ControlName, data: Control) -> floa
 
 def _damping_ratio(channels: Channels, control: ControlName, data: Control) -> float | None:
     """Return the force correlated with the rate over that by the rig's damping and friction."""
-    force, moved = channels[channel(control, "force")], channels[_moved(channels, control)[0]]
+    force, moved = channels[channel(control, "force")], channels[motions_in(channels, control)[0]]
     rate = np.gradient(moved, channels[TIME])
     resists = data.loader.damping * rate + data.loader.friction * np.sign(rate)
     others = np.column_stack([np.ones(rate.size), moved, np.gradient(rate, channels[TIME])])
