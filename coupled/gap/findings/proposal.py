@@ -22,7 +22,7 @@ import numpy as np
 from coupled.errors import InputError
 from coupled.gap.effects.effect import Effect, apply, keys_of, possible, touched, value_of
 from coupled.gap.effects.library import EFFECTS
-from coupled.gap.effects.settings import contact, settings
+from coupled.gap.effects.settings import settings
 from coupled.gap.findings.flown import fly_force
 from coupled.gap.findings.summary import plain
 from coupled.gap.noise.noise import rms_of
@@ -66,23 +66,20 @@ class EffectPower:
 
 
 def power(
-    nominal: Rig,
-    control: ControlName,
-    outputs: Sequence[Output],
-    library: Sequence[Effect] = EFFECTS,
+    nominal: Rig, control: ControlName, outputs: Sequence[Output], library: Sequence[Effect]
 ) -> tuple[EffectPower, ...]:
     """Return the smallest detectable size of each effect."""
     lacking, found = lacking_keys(nominal), []
     for effect in library:
         ours = [] if lacking & keys_of([effect]) else touched(outputs, [effect])
-        values = _least(nominal, control, ours, effect) if ours else None
+        values = _least(Case(nominal, control, ours), effect) if ours else None
         keys = [(p.named(control), effect.value_key(p)) for p in effect.free if p.role != "shape"]
         sizes = () if values is None else tuple((name, values[key]) for name, key in keys)
         found.append(EffectPower(effect.name, effect.stage, bool(ours), values is not None, sizes))
     return tuple(found)
 
 
-def _values(effect: Effect, size: float, nominal: Rig, control: ControlName) -> dict[str, float]:
+def _values(case: Case, effect: Effect, size: float) -> dict[str, float]:
     """Return the parameters of an effect of a size; at size 1 they are the fit's first start."""
     values = {}
     for p in effect.free:
@@ -95,27 +92,26 @@ def _values(effect: Effect, size: float, nominal: Rig, control: ControlName) -> 
         elif p.is_limit:
             value = start / size
         else:
-            filed = value_of(nominal, control, p.above or p.key) if p.mode == "value" else 0.0
+            key = p.above or p.key
+            filed = value_of(case.nominal, case.control, key) if p.mode == "value" else 0.0
             value = float(filed) + size * start
         values[effect.value_key(p)] = float(np.clip(value, p.low, p.high))
     return values
 
 
-def _signature(
-    nominal: Rig, control: ControlName, outputs: Sequence[Output], effect: Effect, size: float
-) -> float:
+def _signature(case: Case, effect: Effect, size: float) -> float:
     """Return the largest rms signature of an effect in an output, nuisance parameters profiled.
 
     It is relative to that which raises a residual of noise to the output's limit; 0 if the rig
     cannot have the effect.
     """
-    rig = possible(nominal, control, [effect], _values(effect, size, nominal, control))
+    rig = possible(case.nominal, case.control, [effect], _values(case, effect, size))
     if rig is None:
         return 0.0
     largest = 0.0
-    for output in outputs:
-        change = output.residual(rig) - output.residual(nominal)
-        basis = _settings(nominal, control, output, effect)
+    for output in case.outputs:
+        change = output.residual(rig) - output.residual(case.nominal)
+        basis = _settings(case, output, effect)
         if basis.size:
             change = change - basis @ np.linalg.lstsq(basis, change, rcond=None)[0]
         wanted = math.sqrt(output.limit**2 - 1.0)
@@ -123,28 +119,26 @@ def _signature(
     return largest
 
 
-def _settings(nominal: Rig, control: ControlName, output: Output, effect: Effect) -> Floats:
+def _settings(case: Case, output: Output, effect: Effect) -> Floats:
     """Return the signatures of the stage's nuisance parameters, a column each."""
     columns = []
-    known = settings(nominal, control, [output])
+    known = settings(case.nominal, case.control, [output])
     beside = [one for name, one in known.items() if name != effect.name]
-    for setting in (*beside, *(contact(nominal, control) if effect.dry else ())):
+    for setting in (*beside, *(case.contact if effect.dry else ())):
         if output.stage in setting.shows_in:
             (number,) = setting.free
             nudge = MOST * (number.high - number.starts[0])
             values = {setting.value_key(number): number.starts[0] + nudge}
-            rig = apply(nominal, control, [setting], values)
-            columns.append(output.residual(rig) - output.residual(nominal))
+            rig = apply(case.nominal, case.control, [setting], values)
+            columns.append(output.residual(rig) - output.residual(case.nominal))
     return np.column_stack(columns) if columns else np.empty((0, 0))
 
 
-def _least(
-    nominal: Rig, control: ControlName, outputs: Sequence[Output], effect: Effect
-) -> dict[str, float] | None:
+def _least(case: Case, effect: Effect) -> dict[str, float] | None:
     """Return the smallest parameters at which an effect is detected; None if at no size."""
 
     def shows(size: float) -> bool:
-        return _signature(nominal, control, outputs, effect, size) >= 1.0
+        return _signature(case, effect, size) >= 1.0
 
     if not effect.free:
         return {} if shows(1.0) else None
@@ -161,7 +155,7 @@ def _least(
     while high > (1.0 + SMALL) * low:
         middle = math.sqrt(low * high)
         low, high = (low, middle) if shows(middle) else (middle, high)
-    return _values(effect, high, nominal, control)
+    return _values(case, effect, high)
 
 
 @dataclass(frozen=True)
