@@ -126,14 +126,25 @@ def _what(found: Findings, floor: str) -> str:
     acting = {stage.name: _acting(found, stage, budgets.get(stage.name)) for stage in stages}
     if not any(acting.values()) and found.verdict == "unexplained":
         return f"A gap in the {', '.join(found.guilty)} that no effect of the library explains."
-    said = []
+    said = [_uncertain(found)]
+    verb = "would explain" if said[0] else "explains"
     for stage in sorted(stages, key=lambda one: not acting[one.name]):
         ours = acting[stage.name]
         by_others = any({*ours} <= {*acting.get(name, ())} for name in stage.shown_in)
         # A stage without an output, with the effects of its neighbours, is not described again.
         if stage.left is not None or not ours or not by_others:
-            said.append(_explained(ours, stage, budgets.get(stage.name), floor))
-    return " ".join(said)
+            said.append(_explained(ours, stage, budgets.get(stage.name), floor, verb))
+    return " ".join(sentence for sentence in said if sentence)
+
+
+def _uncertain(found: Findings) -> str:
+    """Return that no effect found is a certain cause of an unexplained gap."""
+    most = max((effect.probability for effect in found.effects), default=1.0)
+    if found.verdict != "unexplained" or most >= CERTAIN:
+        return ""
+    of = "the effect has" if len(found.effects) == 1 else "no effect has more than"
+    where = joined(found.guilty)
+    return f"A gap in the {where} without a certain cause: {of} a probability of {most:.2f}."
 
 
 def no_gap_in(controls: Sequence[str], floor: str = NOISE) -> str:
@@ -150,9 +161,16 @@ def _acting(found: Findings, stage: StageResult, budget: StageBudget | None) -> 
 
 
 def _explained(
-    acting: Sequence[EffectResult], stage: StageResult, budget: StageBudget | None, floor: str
+    acting: Sequence[EffectResult],
+    stage: StageResult,
+    budget: StageBudget | None,
+    floor: str,
+    verb: str,
 ) -> str:
-    """Return the share of a stage's gap that each effect explains, and what remains."""
+    """Return the share of a stage's gap that each effect explains, and what remains.
+
+    `verb` is `explains`, or `would explain` of effects without a certain one.
+    """
     if budget is None:
         return f"The gap lies in the {stage.name}."
     if not acting:
@@ -168,7 +186,7 @@ def _explained(
         one = [effect, *beside] if effect is main else [effect]
         share = _per_cent(sum(budget.of(e.name) for e in one))
         words = " with ".join(_effect(e) for e in one)
-        shares.append(f"{words}{',' if one[-1].parameters else ''} explains {share}")
+        shares.append(f"{words}{',' if one[-1].parameters else ''} {verb} {share}")
     said = f"{capital(' and '.join(shares))} of the {stage.name}'s gap"
     over = stage.left is not None and stage.limit is not None and stage.left > stage.limit
     if over and not stage.unexplained:
@@ -324,10 +342,8 @@ def _sure(found: Findings) -> str:
     if not found.effects:
         return ""
     if found.verdict == "unexplained":
-        most = max(effect.probability for effect in found.effects)
-        if most < CERTAIN:
-            return f"No effect is certain: their probability is {most:.2f} at most.{_undone(found)}"
-        return "The certain effects explain less than half of the gap."
+        few = "The certain effects explain less than half of the gap."
+        return _undone(found) if _uncertain(found) else few
     each = {plain(effect.name): f"{effect.probability:.2f}" for effect in found.effects}
     if len({*each.values()}) > 1:
         return f"Probabilities: {', '.join(f'{name} {p}' for name, p in each.items())}."
@@ -340,7 +356,7 @@ def _undone(found: Findings) -> str:
     names = [name for name, tests in known if tests is not None and tests.undone > 1.0]
     if len(names) < 2:
         return ""
-    return f" {capital(' and '.join(names))} cancel each other in a channel that has no gap."
+    return f"{capital(' and '.join(names))} cancel each other in a channel that has no gap."
 
 
 def closes(shrink: Shrink) -> str:
