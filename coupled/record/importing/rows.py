@@ -24,6 +24,10 @@ Rows = NDArray[np.int64]
 # Largest number of pieces, by time, into which other rows may split a run of rows of the log. Late
 # rows split a run once or twice, two recordings of the same time at every row.
 MOST_PIECES = 4
+HOUR_s = 3600.0  # by which daylight saving sets local time
+_WITHOUT_SUMMER_TIME = (
+    "export the time in UTC or with its zone, or where rows are even give clock.rate_Hz and no from"
+)
 COARSE = 0.1  # share of repeated stamps from which the stamps are coarse, not rows duplicate
 
 
@@ -74,6 +78,9 @@ def check_order(log: Log, time_s: Floats, clock: Stamped, key: str) -> None:
         problem = f"row {line}: the first stamp is {-steps_s[0]:.6g} s later than the next one, as"
         problem += f" a stale one of an earlier run is: {key}.drop_rows = [{line}] leaves it out"
         raise InputError(log.file, clock.source, problem)
+    if back.size == 1 and _summer_time(log, time_s, row, clock):
+        problem = f"row {line}: time goes back by an hour, as local time does when daylight saving"
+        raise InputError(log.file, clock.source, f"{problem} ends: {_WITHOUT_SUMMER_TIME}")
     back_s = f"time goes back from {time_s[row]:.6f} to {time_s[row + 1]:.6f} s"
     ahead = np.flatnonzero(time_s[row + 1 :] > time_s[row])
     last = row + int(ahead[0]) if ahead.size else time_s.size - 1
@@ -118,10 +125,23 @@ def check_steps(
         problem = f"row {line}: the first stamp is {steps_s[0]:.6g} s before the next one, as a"
         problem += f" stale one is: {key}.drop_rows = [{line}] leaves it out"
         raise InputError(log.file, clock.source, problem)
+    if gaps.size == 1 and _summer_time(log, time_s, row, clock):
+        problem = f"row {log.line(first + row + 1)}: time goes on by an hour, as local time does"
+        problem += f" when daylight saving begins: {_WITHOUT_SUMMER_TIME}"
+        raise InputError(log.file, clock.source, problem)
     lost = round(steps_s[row] / median_s) - 1
     problem = f"row {log.line(first + row + 1)}: {lost} rows are missing after {time_s[row]:.6f} s;"
     problem += f" longest_gap_rows = {longest_gap} allows no more; cut by start_s or end_s"
     raise InputError(log.file, clock.source, problem)
+
+
+def _summer_time(log: Log, time_s: Floats, row: int, clock: Stamped) -> bool:
+    """Tell whether a clock of dates or times of day is set by an hour after a row."""
+    if not (clock.date or log.columns[clock.source].dtype.is_temporal()):
+        return False
+    steps_s = np.diff(time_s)
+    median_s = float(np.median(steps_s))
+    return bool(abs(abs(steps_s[row] - median_s) - HOUR_s) < median_s)
 
 
 def _all_repeat(log: Log, time_s: Floats, first: int, clock: Stamped) -> bool:

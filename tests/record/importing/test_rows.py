@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from datetime import datetime, timedelta
 from pathlib import Path
 
 import numpy as np
@@ -116,3 +117,30 @@ def test_a_row_without_a_time_can_be_left_out(tmp_path: Path) -> None:
     there = TIME_s != TIME_s[6]
     found = rows(tmp_path, log, "drop_rows = [8]")
     np.testing.assert_allclose(found[there], FORCE_N[there], rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("set_h", "zone", "what"),
+    [(-1, "", "goes back"), (1, "", "goes on"), (0, "+02:00", "")],
+)
+def test_local_time_that_is_set_by_an_hour_is_named_as_daylight_saving(
+    tmp_path: Path, set_h: int, zone: str, what: str
+) -> None:
+    """The refusal named another run or clock, and rows to leave out."""
+    start = datetime.fromisoformat("2025-10-26T02:59:55")
+    stamps = [
+        start + timedelta(hours=set_h * (row >= 300), seconds=row / 60) for row in range(ROWS)
+    ]
+    cells = zip(stamps, LINES[1:], strict=True)
+    log = [f"{stamp.isoformat()}{zone},{rest.partition(',')[2]}" for stamp, rest in cells]
+    if zone:  # of the winter's time, for the same instants
+        log[300:] = [line.replace("T03", "T02").replace(zone, "+01:00") for line in log[300:]]
+    text, dates = "\n".join(["T,F,D", *log]), MAP.replace('unit = "ms"', 'date = "iso"', 1)
+    if not what:
+        record, _ = imported(tmp_path, text, dates)
+        np.testing.assert_allclose(record["column_force_N"], FORCE_N, rtol=1e-9)
+        return
+    with pytest.raises(InputError, match=f"row 302: time {what} by an hour.*daylight saving"):
+        imported(tmp_path, text, dates)
+    even = MAP.replace('from = "T"\nunit = "ms"', "rate_Hz = 60")  # the remedy
+    np.testing.assert_allclose(imported(tmp_path, text, even)[0]["column_force_N"], FORCE_N, 1e-9)
