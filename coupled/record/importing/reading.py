@@ -153,6 +153,13 @@ class Log:
         column = self._pointed(name, column)
         check_numeric(self.file, name, column)
         values = numbers(self.file, name, column, True, self.line, LATEST_ns)
+        scaling = self.unscaled.get(name)
+        if scaling and not clock.unit:
+            problem = (
+                f"the file gives {scaling}, and whether its numbers still need that is not known:"
+            )
+            problem += f' give {key}.unit, the unit of its numbers as they are, as "ms"'
+            raise InputError(self.file, name, problem)
         unit = clock.unit or self._time_unit(name, f"{key}.unit")
         factor = known_unit(unit, map_file, f"{key}.unit").factor
         exact = Fraction(factor).limit_denominator(10**12)  # 1/1000, not the double next to it

@@ -11,6 +11,7 @@ import h5py
 import numpy as np
 import polars as pl
 import pytest
+from nptdms import ChannelObject, TdmsWriter
 from scipy import io as scipy_io
 
 from coupled.errors import InputError
@@ -239,6 +240,40 @@ def test_a_file_of_one_matrix_is_refused_with_how_to_read_it(tmp_path: Path, kin
             file["data"] = rows
     with pytest.raises(InputError, match=r"data: .* x 3 numbers.* log.matrix and log.names"):
         propose([path])
+
+
+@pytest.mark.parametrize("kind", ["h5", "tdms"])
+def test_a_gain_in_the_file_is_asked_about(tmp_path: Path, kind: str) -> None:
+    """No question was asked, and the import refused the map."""
+    path, step = tmp_path / f"log.{kind}", {"wf_increment": 1.0 / 60.0}
+    named = {"time_s": TIME_s, "force_N": FORCE_N / 2.5, "column_computed_m": DEFLECTION_m}
+    gains = {"force_N": {"gain": 2.5, **step}, "time_s": {"scale": 1e-3}}
+    if kind == "h5":
+        with h5py.File(path, "w") as file:
+            for name, values in named.items():
+                file[name] = values
+                file[name].attrs.update(gains.get(name, {}))
+    else:
+        del named["time_s"]
+        with TdmsWriter(path) as writer:
+            writer.write_segment(
+                [ChannelObject("g", n, v, gains.get(n, step)) for n, v in named.items()]
+            )
+    proposal, table = proposed(path)
+    force, clock = table["channels"]["column_force_N"], table["clock"]
+    asked = [question for question in proposal.questions if "the file gives" in question]
+    assert len(asked) == (2 if kind == "h5" else 1)
+    assert force["scale"] == "?"
+    assert (clock.get("unit") == "?") is (kind == "h5")
+    text = proposal.text.replace('scale = "?"', "scale = 2.5")
+    if kind == "h5":
+        (tmp_path / "map.toml").write_text(text.replace('unit = "?"', "", 1))
+        with pytest.raises(InputError, match=r"time_s: the file gives scale = 0.001, .*clock.unit"):
+            import_log(path, tmp_path / "map.toml")
+        text = text.replace('unit = "?"', 'unit = "s"', 1)
+    (tmp_path / "map.toml").write_text(text)
+    record, _ = import_log(path, tmp_path / "map.toml")
+    np.testing.assert_allclose(record["column_force_N"], FORCE_N, rtol=1e-9)
 
 
 def test_without_a_header_a_column_that_rises_evenly_may_be_the_time(tmp_path: Path) -> None:

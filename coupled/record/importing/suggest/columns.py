@@ -34,7 +34,8 @@ class Column:
     `values` are its numbers, NaN if empty, shape (rows,); for a column of lists, their first
     elements, and `length` is the number of elements. Dates are in s from the first, in the pattern
     `date`, which is "?" if it is unknown. The rows `untimed`, above the first and below the last
-    time, are left out. `doubt` is the reason why the log's own text does not determine the unit.
+    time, are left out. `doubt` is the reason why the log's own text does not determine the unit,
+    `unscaled` a scaling in the log that is not applied.
     """
 
     log: str
@@ -46,6 +47,7 @@ class Column:
     date: str = ""
     untimed: tuple[str, ...] = ()
     doubt: str = ""
+    unscaled: str = ""
 
     @property
     def moves(self) -> bool:
@@ -115,7 +117,8 @@ def _column(log: Log, name: str, unit: str) -> Column:
     column = _read(log, name, read_name(own, unit, log.file.stem))
     # The bracket of a topic's field is an element.
     stated = unit or ("" if name in log.groups else in_brackets(own))
-    return replace(column, doubt=_doubt(stated, read_name(own).unit))
+    doubt = _doubt(stated, read_name(own).unit)
+    return replace(column, doubt=doubt, unscaled=log.unscaled.get(name, ""))
 
 
 def _doubt(stated: str, named: str) -> str:

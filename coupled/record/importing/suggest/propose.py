@@ -267,6 +267,10 @@ def _clock(column: Column, main: bool) -> list[Line]:
         remark = 'in which pattern? as "%d.%m.%Y %H:%M:%S.%f"' if column.date == "?" else ""
         lines.append(("date", column.date, remark))
         fit = [] if remark else fit
+    elif column.kind != "dates" and column.unscaled:
+        remark = f"the file gives {column.unscaled}: the unit of its numbers as they are?"
+        lines.append(("unit", "?", remark))
+        fit = []
     elif column.kind != "dates" and column.doubt and column.reading.unit:
         lines.append(("unit", "?", column.doubt))
         fit = []
@@ -358,6 +362,11 @@ def _channel_lines(
     elif magnitude and "force" in channel:
         lines.append(("sign", "?", "never negative: 1 or -1, if the hand only pulled; a size"))
     unit = column.reading.unit
+    if column.unscaled:
+        remark = (
+            f"the file gives {column.unscaled}: give it, with an offset, of raw numbers; else 1"
+        )
+        lines.append(("scale", "?", remark))
     if column.doubt:
         known = " or ".join(units_like(_own(channel))[:4])
         lines.append(("unit", "?", f"{column.doubt}: {known}? else give scale and offset too"))
