@@ -33,11 +33,19 @@ from coupled.gap.effects.effect import (
     section_of,
     touched,
     value,
+    value_of,
 )
 from coupled.gap.effects.library import BY_NAME, EFFECTS, LAG
 from coupled.gap.effects.linkage import SERVO
-from coupled.gap.effects.settings import CLOCK, Scales, in_scale, is_dry
-from coupled.gap.noise.noise import rms_of
+from coupled.gap.effects.settings import (
+    CLOCK,
+    CONTACT,
+    Scales,
+    contact,
+    in_scale,
+    is_dry,
+    most_yielding,
+)
 from coupled.gap.prepare import as_driven, in_own_trims, readers_of
 from coupled.gap.search.case import Case, Tell
 from coupled.gap.search.fit import fit_set
@@ -49,11 +57,12 @@ from coupled.gap.thresholds import (
     FAR,
     LEAST_SERVO_RATIO,
     LESSER,
+    MINOR,
     NEGLIGIBLE,
     NORMAL_95,
     SERVO_START_Hz,
 )
-from coupled.record.channels import ControlName
+from coupled.record.channels import ControlName, unit_of
 from coupled.record.record import Record
 from coupled.results import Plain, TableResult, frame_of
 from coupled.rig.rig import Rig
@@ -83,6 +92,7 @@ LIKE_CONTACT = ("loader.delay_s", "loader.play_m", "loader.play_rad")
 NONE_AT_ZERO = (
     *("servo_frequency", "servo_rate_limit", "servo_acceleration_limit", "bend_frequency"),
     *("bend_limit", "force_limit", "play_stiffness", "stop_aft", "stop_forward"),
+    "friction_stiffness",
 )
 
 
@@ -91,8 +101,9 @@ def default_keys(
 ) -> tuple[str, ...]:
     """Return the keys that are fitted by default, of the stages that the records can judge.
 
-    Not a basic gradient of 0, a servo frequency of 0, or a regressor that the file does not name:
-    the rig has none. With imposed motion (`moved`) of the linkage only the play shows.
+    A basic gradient of 0 is no spring, a servo frequency of 0 no servo; they are not fitted, nor is
+    a regressor that the file does not name. With imposed motion (`moved`) of the linkage only the
+    play shows.
     """
     fields = {f: key for key, f in fields_of(rig, control, "loader").items()}
     loader = rig.controls[control].loader
@@ -158,9 +169,9 @@ def _bounds(holder: Section, field: str, start: float) -> tuple[float, float]:
 class Number:
     """A fitted parameter: value in the file, fitted value, and half of its 95 % interval.
 
-    `half` is None if the parameter is undetermined, or absent: filed as 0, with 0 in its interval,
-    in which `most` is then the largest size. `least` and `greatest` are the bounds of a rig file,
-    or the fit's lower one.
+    `half` is None if the parameter is undetermined, or absent: its filed value is 0, and its 95 %
+    interval includes 0. `most` is then the largest size in this interval. `least` and
+    `greatest` are the bounds of a rig file, or the fit's lower one.
     """
 
     key: str
@@ -182,7 +193,10 @@ class Number:
 
     @property
     def width(self) -> float:
-        """Half of the interval over the filed or fitted size, above 1 if it is not determined."""
+        """Half of the interval over the parameter's size, above 1 if it is not determined.
+
+        The size is the filed or the fitted value, whichever is larger.
+        """
         if self.half is None:
             return math.inf
         return self.half / max(abs(self.filed), abs(self.found), 1e-300)
@@ -327,15 +341,16 @@ def fit_nominal(
             problem = f"nothing in these records depends on it; they lack {needs}"
             raise InputError(next(iter(records)), key, problem)
     shown_in = {output.stage for output in touched(outputs, effects)}
-    case = Case(rig, control, outputs, tell)
-    held, whole, fitted, each = _fitted(case, effects)
+    fitter = _Fitter(rig, control, outputs, tell, 0.0 if scales is None else scales.way)
+    effects, begun = fitter.with_contact_starts(effects)
+    held, whole, fitted, each = fitter.fitted(effects, begun)
     numbers = dict(zip(chosen, fitted, strict=True))
     while loose := [numbers[e.name] for e in effects if numbers[e.name].width > 1.0]:
         # The least determined one stays as filed, and the others are fitted again.
         worst = max(loose, key=lambda number: number.width)
         numbers[worst.key] = worst.as_filed
         effects = [effect for effect in effects if effect.name != worst.key]
-        held, _, fitted, each = _fitted(case, effects)
+        held, _, fitted, each = fitter.fitted(effects, begun)
         numbers |= {one.key: one for one in fitted}
     together = [one for group in whole.groups.values() for one in alike(group)]
     found = tuple(numbers.values())
@@ -351,95 +366,176 @@ def fit_nominal(
         tuple(_channel(output, rig, held.rig, files[output.record]) for output in used),
         (
             *_doubts_of_residual(rig, each, used),
+            *_doubts_of_contact(known, control, whole),
             *_doubts_of_servo(known, control, determined, held.rig, used),
         ),
     )
 
 
-def _fitted(case: Case, effects: Sequence[Effect]) -> tuple[Fit, Fit, list[Number], dict[int, Fit]]:
-    """Return fits to every other stretch and to all, their parameters, and each record's fit.
+@dataclass(frozen=True)
+class _Fitter:
+    """Fits parameters of a rig to some outputs; `way` is the rms of the motion, 0 if unknown."""
 
-    The interval of a parameter is at least its scatter between the records, each fitted alone.
-    """
-    tell = case.tell or (lambda *_: None)
-    records = sorted({output.record for output in case.outputs})
-    tasks = len(records) + 2
-    tell("fitting", 0, tasks)
-    held = _fit(case, effects, part="fitted")
-    tell("fitting to all", 1, tasks)
-    whole = _fit(case, effects, held.values)
-    each = {records[0]: whole} if len(records) == 1 else dict[int, Fit]()
-    for i, record in enumerate(records if not each else ()):
-        tell(f"fitting to record {i + 1} alone", i + 2, tasks)
-        ours = [output for output in case.outputs if output.record == record]
-        each[record] = _fit(replace(case, outputs=ours), effects, whole.values)
-    alone = list(each.values()) if len(each) > 1 else []
-    return held, whole, [_number(case, one, whole, alone) for one in effects], each
+    rig: Rig
+    control: ControlName
+    outputs: Sequence[Output]
+    tell: Tell | None
+    way: float
 
+    def fitted(
+        self, effects: Sequence[Effect], begun: Mapping[str, float]
+    ) -> tuple[Fit, Fit, list[Number], dict[int, Fit]]:
+        """Return fits to every other stretch and to all, their parameters, and each record's fit.
 
-def _fit(
-    case: Case,
-    effects: Sequence[Effect],
-    start: Mapping[str, float] | None = None,
-    part: Part = "all",
-) -> Fit:
-    """Return effects fitted to a part of a case's outputs, beside nuisance parameters.
+        `begun` are start values. The interval of a parameter is at least its scatter between the
+        records, each fitted alone.
+        """
+        records = sorted({output.record for output in self.outputs})
+        tasks = len(records) + 2
+        self._say("fitting", 0, tasks)
+        held = self._fit(effects, self.outputs, begun, part="fitted")
+        self._say("fitting to all", 1, tasks)
+        whole = self._fit(effects, self.outputs, held.values)
+        if len(records) == 1:
+            numbers = [self._number(one, whole, ()) for one in effects]
+            return held, whole, numbers, {records[0]: whole}
+        each = dict[int, Fit]()
+        for i, record in enumerate(records):
+            self._say(f"fitting to record {i + 1} alone", i + 2, tasks)
+            ours = [output for output in self.outputs if output.record == record]
+            each[record] = self._fit(effects, ours, whole.values)
+        alone = list(each.values())
+        return held, whole, [self._number(one, whole, alone) for one in effects], each
 
-    The time stamp of the force may be off within the tolerance of a recorder's clocks, unless a
-    delay of the force is free; else a lag of a fraction of a frame would be fitted as friction. Dry
-    friction yields before it slips if that lowers the residual by a step; else the force after each
-    reversal would be fitted as mass. With a rigid contact, delay and play are fitted in place of
-    presliding, so the fit with presliding also starts without them.
-    """
-    (number,) = CLOCK.free
-    timed = {number.key, BY_NAME[LAG].free[0].key}
-    loader = any({*CLOCK.shows_in} & {*effect.shows_in} for effect in effects)
-    beside = [CLOCK] if loader and timed.isdisjoint(keys_of(effects)) else []
-    priors = {CLOCK.value_key(number): (0.0, number.high / NORMAL_95)}
-    rigid = fit_set(case, effects, beside, priors, start or {}, part=part)
-    yielding = _contact(case, effects) if loader else []
-    if not yielding:
-        return rigid
-    beside += yielding
-    ours, known = touched(case.outputs, yielding), {**rigid.values, **(start or {})}
-    absent = {
-        effect.value_key(p): 0.0
-        for effect in effects
-        for p in effect.free
-        if p.key_on(case.control) in LIKE_CONTACT and p.nominal(case.nominal, case.control) == 0.0
-    }
-    each = list[tuple[float, Fit]]()
-    for values in [known, {**known, **absent}] if absent else [known]:
-        begun = case.with_contact(effects, beside, values)
-        soft = fit_set(case, effects, beside, priors, begun, part=part)
-        each.append((_held_out_rms(ours, soft.rig), soft))
-    left, soft = min(each, key=lambda one: one[0])
-    return soft if left < (1.0 - LESSER) * _held_out_rms(ours, rigid.rig) else rigid
+    def _say(self, what: str, done: int, tasks: int) -> None:
+        if self.tell is not None:
+            self.tell(what, done, tasks)
 
+    def _fit(
+        self,
+        effects: Sequence[Effect],
+        outputs: Sequence[Output],
+        start: Mapping[str, float] | None = None,
+        part: Part = "all",
+    ) -> Fit:
+        """Return effects fitted to a part of some outputs, beside nuisance parameters.
 
-def _contact(case: Case, effects: Sequence[Effect]) -> list[Effect]:
-    """Return the presliding parameters that are not free, if the fitted rig has friction."""
-    begun = {effect.value_key(p): p.starts[0] for effect in effects for p in effect.free}
-    rig = possible(case.nominal, case.control, effects, begun)
-    if rig is None or not is_dry(rig, case.control):
-        return []
-    free = {p.key_on(case.control) for effect in effects for p in effect.free}
-    return [one for one in case.contact if one.free[0].key_on(case.control) not in free]
+        A time stamp error of the force is within the tolerance of a recorder's clocks. Without it a
+        lag of a fraction of a frame is fitted as friction. A free delay of the force stands for it.
+        Dry friction yields before it slips, as in a diagnosis, if the residual is a step lower for
+        it. Without it the force after each reversal is fitted as mass. A contact that yields by the
+        largest length of a diagnosis may yield by up to the rms of the motion. With a rigid
+        contact, delay and play are fitted in place of presliding, so the fit with presliding also
+        starts without delay and play.
+        """
+        (number,) = CLOCK.free
+        timed = {number.key, BY_NAME[LAG].free[0].key}
+        loader = any({*CLOCK.shows_in} & {*effect.shows_in} for effect in effects)
+        beside = [CLOCK] if loader and timed.isdisjoint(keys_of(effects)) else []
+        priors = {CLOCK.value_key(number): (0.0, number.high / NORMAL_95)}
+        start = start or {}
+        case = Case(self.rig, self.control, outputs)
+        rigid = fit_set(case, effects, beside, priors, start, part=part)
+        if not (loader and self._contact(case, effects)):
+            return rigid
 
+        def yielding(case: Case) -> tuple[float, Fit]:
+            return self._yielding(case, effects, beside, priors, (rigid.values, start), part)
 
-def _number(case: Case, effect: Effect, whole: Fit, each: Sequence[Fit]) -> Number:
-    """Return a parameter with the wider of its interval and its scatter between records."""
-    (parameter,) = effect.free
-    name = effect.value_key(parameter)
-    found, half = whole.values[name], 0.5 * (whole.high[name] - whole.low[name])
-    if each:
-        half = max(half, 2.0 * float(np.std([one.values[name] for one in each], ddof=1)))
-    if abs(found - parameter.low) < 1e-6 * parameter.starts[0]:
-        found = parameter.low  # a fit at its bound stays slightly inside
-    filed = float(parameter.nominal(case.nominal, case.control))
-    known = half if math.isfinite(half) else None
-    bounds = parameter.low, parameter.accepted(case.nominal, case.control)[1]
-    return Number(effect.name, filed, found, known, *bounds, name in whole.at_bound)
+        left, soft = yielding(case)
+        if self._ends_at_longest(case, soft):
+            longer = yielding(replace(case, longest=self.way))
+            left, soft = longer if longer[0] < (1.0 - LESSER) * left else (left, soft)
+        ours = touched(outputs, self._contact(case, effects))
+        return soft if left < (1.0 - LESSER) * _held_out_rms(ours, rigid.rig) else rigid
+
+    def _yielding(
+        self,
+        case: Case,
+        effects: Sequence[Effect],
+        beside: Sequence[Effect],
+        priors: Mapping[str, tuple[float, float]],
+        known: tuple[Mapping[str, float], Mapping[str, float]],
+        part: Part,
+    ) -> tuple[float, Fit]:
+        """Return a fit with presliding, and its residual RMS on held-out stretches.
+
+        `known` are the values of the fit with a rigid contact, and start values.
+        """
+        given, start = self._contact(case, effects), {**known[0], **known[1]}
+        ours, free = touched(case.outputs, given), [*beside, *given]
+        absent = {
+            effect.value_key(p): 0.0
+            for effect in effects
+            for p in effect.free
+            if p.key_on(self.control) in LIKE_CONTACT and p.nominal(self.rig, self.control) == 0.0
+        }
+        each = list[tuple[float, Fit]]()
+        for values in [start, {**start, **absent}] if absent else [start]:
+            begun = case.with_contact(effects, free, values)
+            soft = fit_set(case, effects, free, priors, begun, part=part)
+            each.append((_held_out_rms(ours, soft.rig), soft))
+        return min(each, key=lambda one: one[0])
+
+    def _ends_at_longest(self, case: Case, soft: Fit) -> bool:
+        """Tell whether a fit's contact yields by the largest length, and the motion is larger."""
+        (length,) = case.contact[0].free if case.contact else (None,)
+        if length is None or self.way <= length.high:
+            return False
+        return soft.values.get(case.contact[0].value_key(length), 0.0) > (1.0 - MINOR) * length.high
+
+    def with_contact_starts(
+        self, effects: Sequence[Effect]
+    ) -> tuple[list[Effect], Mapping[str, float]]:
+        """Return effects with ranges of a free stiffness of the contact, and all start values.
+
+        The cost has local minima over it; the length of a nuisance parameter begins at the best
+        point of a grid. The start is therefore that of the fit in which the contact is not free.
+        """
+        given = {key.format(d=unit_of(self.control)) for key in CONTACT}
+        names = {e.name for e in effects if e.free[0].key_on(self.control) in given}
+        if not names or not contact(self.rig, self.control):
+            return list(effects), {}
+        fitted = self._fit([e for e in effects if e.name not in names], self.outputs)
+        loader = fitted.rig.controls[self.control].loader
+        if loader.friction_stiffness == 0.0:
+            return list(effects), fitted.values
+        begun, ranged = dict(fitted.values), list[Effect]()
+        for effect in effects:
+            (number,) = effect.free
+            if effect.name in names:
+                start = float(value_of(fitted.rig, self.control, number.key))
+                begun[effect.value_key(number)] = start
+                if number.low > 0.0:
+                    number = replace(number, low=start / FAR, high=start * FAR, starts=(start,))
+            ranged.append(replace(effect, parameters=(number,)))
+        return ranged, begun
+
+    def _contact(self, case: Case, effects: Sequence[Effect]) -> list[Effect]:
+        """Return the presliding parameters that are not free, if the fitted rig has friction."""
+        begun = {effect.value_key(p): p.starts[0] for effect in effects for p in effect.free}
+        rig = possible(self.rig, self.control, effects, begun)
+        if rig is None or not is_dry(rig, self.control):
+            return []
+        free = {p.key_on(self.control) for effect in effects for p in effect.free}
+        if CONTACT[0].format(d=unit_of(self.control)) in free:
+            return []  # the fitted rig has it, and its share is free or as filed
+        return [one for one in case.contact if one.free[0].key_on(self.control) not in free]
+
+    def _number(self, effect: Effect, whole: Fit, each: Sequence[Fit]) -> Number:
+        """Return a parameter with the wider of its interval and its scatter between records."""
+        (parameter,) = effect.free
+        name = effect.value_key(parameter)
+        found, half = whole.values[name], 0.5 * (whole.high[name] - whole.low[name])
+        if each:
+            scatter = float(np.std([one.values[name] for one in each], ddof=1))
+            half = max(half, 2.0 * scatter)
+        if abs(found - parameter.low) < 1e-6 * parameter.starts[0]:
+            found = parameter.low  # a fit at its bound stays slightly inside
+        filed = float(parameter.nominal(self.rig, self.control))
+        known = half if math.isfinite(half) else None
+        bounds = parameter.low, parameter.accepted(self.rig, self.control)[1]
+        return Number(effect.name, filed, found, known, *bounds, name in whole.at_bound)
 
 
 def _doubts_of_residual(
@@ -461,12 +557,27 @@ def _doubts_of_residual(
     )
 
 
+def _doubts_of_contact(found: Rig, control: ControlName, whole: Fit) -> tuple[str, ...]:
+    """Return the doubt about friction that yields further than a diagnosis of the rig expects."""
+    for effect in contact(found, control, math.inf)[:1]:
+        length = whole.values.get(effect.value_key(effect.free[0]), 0.0)
+        if length > most_yielding(control):
+            d = unit_of(control)
+            return (
+                f"friction yields by {length:.3g} {d} before it slips, further than the"
+                f" {most_yielding(control):g} {d} of dry contacts: for a rig with this, add"
+                f" --free loader.friction_stiffness_N_per_{d}",
+            )
+    return ()
+
+
 def _doubts_of_servo(
     found: Rig, control: ControlName, fitted: Set[str], held: Rig, used: Sequence[Output]
 ) -> tuple[str, ...]:
     """Return the reasons against a fitted servo: low damping, or no better prediction with it.
 
-    `held` is the rig fitted to the stretches that are not held out.
+    `held` is the rig fitted to the stretches that are not held out. A servo that was not fitted is
+    not judged.
     """
     if not {"loader.servo_frequency_Hz", "loader.servo_damping_ratio"} & fitted:
         return ()
@@ -497,7 +608,7 @@ def _doubts_of_servo(
 def _held_out_rms(used: Sequence[Output], rig: Rig) -> float:
     """Return the rms of all residuals on the held-out stretches, in noise floors."""
     left = np.concatenate([output.residual(rig, "held") for output in used])
-    return rms_of(left)
+    return float(np.sqrt(np.mean(left**2)))
 
 
 def _with_starts(
@@ -511,7 +622,10 @@ def _with_starts(
 
 
 def _with_fitted(rig: Rig, control: ControlName, numbers: Sequence[Number]) -> Rig:
-    """Return the rig with fitted values and tolerances; what the host assumes stays as recorded."""
+    """Return the rig with the fitted values and their tolerances.
+
+    The values that the host assumes of the loader do not change, since the records contain them.
+    """
     if control not in rig.controls:
         return rig.changed({one.key: one.found for one in numbers})
     data = rig.controls[control]

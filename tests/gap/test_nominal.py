@@ -103,8 +103,10 @@ def test_a_rest_does_not_count_as_sliding(rest_N: float) -> None:
     assert found(fitted) == pytest.approx(dict(zip(keys, (5.0, DAMPING), strict=True)), rel=0.03)
 
 
-def sprung(seconds: float = 20.0, rate_Hz: float = 100.0, steps: int = 20) -> Record:
-    """Return a record of a mass on a spring whose friction yields by 0.1 mm (Dahl), by Euler."""
+def sprung(
+    seconds: float = 20.0, rate_Hz: float = 100.0, steps: int = 20, yields_m: float = 1e-4
+) -> Record:
+    """Return a record of a mass on a spring whose friction yields (Dahl), by Euler."""
     time = np.arange(round(seconds * rate_Hz * steps)) / (rate_Hz * steps)
     waves = ((25.0, 0.23), (14.0, 0.61), (8.0, 1.7), (5.0, 3.1))
     pull = np.sum([s * np.sin(2.0 * np.pi * at_Hz * time) for s, at_Hz in waves], axis=0)
@@ -116,7 +118,7 @@ def sprung(seconds: float = 20.0, rate_Hz: float = 100.0, steps: int = 20) -> Re
         speed += (force - DAMPING * speed - 1000.0 * place - held) / MASS_kg * time[1]
         place += speed * time[1]
         slips = math.copysign(FRICTION_N, speed)
-        held = slips + (held - slips) * math.exp(-abs(speed) * time[1] / 1e-4)
+        held = slips + (held - slips) * math.exp(-abs(speed) * time[1] / yields_m)
     read += (0.05, 5e-6) * np.random.default_rng(7).standard_normal(read.shape)
     return recorded(rate_Hz, force_N=read[:, 0], computed_m=read[:, 1])
 
@@ -133,7 +135,28 @@ def test_friction_that_yields_before_it_slips_is_not_fitted_as_mass() -> None:
     assert fitted.rig.controls["column"].loader.friction_stiffness == 0.0  # as in a diagnosis
 
 
+STIFFNESS_KEY = "loader.friction_stiffness_N_per_m"
+
+
 @pytest.mark.slow
+def test_friction_may_yield_further_than_in_a_diagnosis() -> None:
+    """With at most 0.5 mm the mass was 6.9 kg, its interval without 8 kg; a free stiffness was
+    undetermined, since its range ended at 1000 N/m, and the friction was 0."""
+    rig = plain_rig(100.0, {"mass_kg": 6.0, "damping_N_s_per_m": 20.0}, 1000.0)
+    records = {"r": sprung(yields_m=3e-3)}
+    nuisance = fit_nominal(rig, records, KEYS)
+    (doubt,) = nuisance.doubts
+    assert doubt.endswith(f"add --free {STIFFNESS_KEY}")
+    for number, real in zip(nuisance.numbers, (MASS_kg, DAMPING, FRICTION_N), strict=True):
+        assert number.interval is not None
+        assert number.interval[0] < real < number.interval[1]
+    free = fit_nominal(rig, records, [*KEYS, STIFFNESS_KEY])
+    assert free.doubts == ()
+    assert found(free)["loader.mass_kg"] == pytest.approx(MASS_kg, rel=0.03)
+    assert found(free)[STIFFNESS_KEY] == pytest.approx(FRICTION_N / 3e-3, rel=0.2)
+    assert free.rig.controls["column"].loader.friction_stiffness == found(free)[STIFFNESS_KEY]
+
+
 def test_a_fit_that_lacks_what_the_machine_has_is_doubtful() -> None:
     """The interval of the gradient excluded it beside a spring that hardens, without a word."""
     rig = plain_rig(100.0, {"mass_kg": 0.8, "damping_N_s_per_m": 2.0}, 3000.0)

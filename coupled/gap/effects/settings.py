@@ -89,17 +89,18 @@ def lag_within_a_step(rig: Rig) -> Effect:
     return setting_of(BY_NAME[LAG], 0.0, step_s, 0.0)
 
 
-def contact(rig: Rig, control: ControlName) -> tuple[Effect, ...]:
+def contact(rig: Rig, control: ControlName, longest: float = 0.0) -> tuple[Effect, ...]:
     """Return the presliding parameters as nuisance parameters; none if the rig file has them.
 
     All dry friction has presliding, of up to half a millimetre, so that its length is no effect.
+    `longest` is another largest length, d.
     """
     if not rig.controls:
         return ()
     loader = rig.controls[control].loader
     if loader.friction_stiffness > 0.0:
         return ()
-    most = most_yielding(control)
+    most = longest or most_yielding(control)
     length = Parameter(
         "", CONTACT[0], "yields", 1e-3 * most, most, (0.1 * most, 0.01 * most), may_end=True
     )

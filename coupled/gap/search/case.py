@@ -75,7 +75,8 @@ class Case:
     `outputs_with_noise_of` gives the outputs with noise floors estimated with another rig. If
     `model_error_in_floors`, the floors include the error of the model of the healthy machine.
     `timings` are (effect, timing, interval of the onset) of effects that begin within the record.
-    They apply to all effects that free the same parameters.
+    They apply to all effects that free the same parameters. `longest` is the largest length of a
+    contact if not the usual one.
     """
 
     nominal: Rig
@@ -85,6 +86,7 @@ class Case:
     outputs_with_noise_of: Callable[[Rig], Sequence[Output]] | None = None
     model_error_in_floors: bool = False
     timings: Sequence[tuple[Effect, Timing, Bounds]] = ()
+    longest: float = 0.0
 
     @cached_property
     def known(self) -> dict[str, Effect]:
@@ -146,7 +148,7 @@ class Case:
     @cached_property
     def contact(self) -> tuple[Effect, ...]:
         """The presliding parameters, which are nuisance parameters of any dry friction."""
-        return contact(self.nominal, self.control)
+        return contact(self.nominal, self.control, self.longest)
 
     @cached_property
     def _above_noise(self) -> set[str]:
