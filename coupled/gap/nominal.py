@@ -88,6 +88,8 @@ USUAL_OF_LOADER = (
 USUAL_OF_LINKAGE = ("servo_frequency", "servo_damping_ratio", "bend", "play")
 # Parameters that imitate presliding friction if the contact is fitted as rigid.
 LIKE_CONTACT = ("loader.delay_s", "loader.play_m", "loader.play_rad")
+FRICTION, OFFSET = "loader.friction_N", "loader.offset_N"
+BY_DIRECTION = ("loader.friction_pull_N", "loader.friction_push_N")
 # Parameters whose value 0 means that the component is absent: a fit stays above 0.
 NONE_AT_ZERO = (
     *("servo_frequency", "servo_rate_limit", "servo_acceleration_limit", "bend_frequency"),
@@ -278,6 +280,38 @@ class NominalFit(TableResult):
         }
 
 
+def _alike_by_direction(found: Sequence[Number], known: Sequence[Alike]) -> list[Alike]:
+    """Return that an offset and friction by direction are inseparable, where one was found.
+
+    Half the difference of friction aft and forward acts as a constant force, in motion and at rest
+    (`friction`). The fit then depends on which of the two is free. An offset larger than the
+    friction is not such a difference, which would be negative one way.
+    """
+    sizes = {one.key: one for one in found if one.half is not None}
+    rubs = [key for key in (FRICTION, *BY_DIRECTION) if key in sizes]
+    told = any(OFFSET in one.keys and {*rubs} & {*one.keys} for one in known)
+    if not rubs or told:
+        return []
+    offset, aft, forward = (sizes.get(key) for key in (OFFSET, *BY_DIRECTION))
+    by_direction = [one for one in (aft, forward) if one is not None]
+    off = 0.0 if offset is None else abs(offset.found)
+    if offset is not None:
+        dry = max(sizes[key].found for key in rubs)
+        if not (offset.half or 0.0) < off < dry:
+            return []
+    elif not by_direction or not _differ(aft, forward):
+        return []
+    others = [] if by_direction else [BY_DIRECTION[1]]
+    return [Alike((*rubs, *others, OFFSET), "friction by direction acts as a constant force")]
+
+
+def _differ(aft: Number | None, forward: Number | None) -> bool:
+    """Tell whether the added frictions aft and forward differ by more than their intervals."""
+    pair = [one for one in (aft, forward) if one is not None]
+    more = sum(side * one.found for side, one in zip((1, -1), pair, strict=False))
+    return abs(more) > math.hypot(*(one.half or 0.0 for one in pair))
+
+
 def _flown_as_recorded(
     rig: Rig, records: Mapping[str, Record], keys: Sequence[str]
 ) -> dict[str, Rig]:
@@ -352,8 +386,10 @@ def fit_nominal(
         effects = [effect for effect in effects if effect.name != worst.key]
         held, _, fitted, each = fitter.fitted(effects, begun)
         numbers |= {one.key: one for one in fitted}
-    together = [one for group in whole.groups.values() for one in alike(group)]
     found = tuple(numbers.values())
+    each_alike = (one for group in whole.groups.values() for one in alike(group))
+    together = [one for one in each_alike if {*one.keys} <= {*chosen}]
+    together += _alike_by_direction(found, together)
     used = [output for output in outputs if output.stage in shown_in]
     files = list(records)
     known = _with_fitted(filed, control, found)
@@ -362,7 +398,7 @@ def fit_nominal(
         control,
         known,
         found,
-        tuple(one for one in together if {*one.keys} <= {*chosen}),
+        tuple(together),
         tuple(_channel(output, rig, held.rig, files[output.record]) for output in used),
         (
             *_doubts_of_residual(rig, each, used),

@@ -51,6 +51,7 @@ def moved(speeds_m_per_s: list[float], dry_N: float = FRICTION_N) -> Record:
     return Record(names, np.column_stack((time, pull, place, 0.0 * time)))
 
 
+DAMPING_KEY = "damping_N_s_per_m"
 KEYS = ("loader.mass_kg", "loader.damping_N_s_per_m", "loader.friction_N")
 
 
@@ -73,6 +74,40 @@ def test_motion_at_one_speed_does_not_tell_friction_from_damping() -> None:
     both = numbers["loader.friction_N"] + 0.1 * numbers["loader.damping_N_s_per_m"]
     assert both == pytest.approx(FRICTION_N + 0.1 * DAMPING, rel=0.03)
     assert numbers["loader.mass_kg"] == pytest.approx(MASS_kg, rel=0.03)
+
+
+def rubbed_by_direction(aft_N: float, forward_N: float, offset_N: float) -> Record:
+    """Return the record of a slide with friction by direction and a constant force."""
+    level = 0.5 * (aft_N + forward_N)
+    plain = moved([0.02, 0.05, 0.1, 0.03, 0.08, 0.15], level)
+    by_direction = 0.5 * (aft_N - forward_N) - offset_N
+    names = ("time_s", "column_force_N", "column_computed_m", "dynamic_pressure_Pa")
+    force = plain["column_force_N"] + by_direction
+    data = [force if name == "column_force_N" else plain[name] for name in names]
+    return Record(names, np.column_stack(data))
+
+
+@pytest.mark.parametrize(
+    ("free", "machine", "told"),
+    [
+        ("offset_N", (5.0, 3.0, 0.0), True),
+        ("offset_N", (4.0, 4.0, -1.0), True),  # of the same record
+        ("offset_N", (4.0, 4.0, 0.0), False),
+        ("offset_N", (4.0, 4.0, 6.0), False),  # friction forward would be negative
+        ("friction_push_N", (3.0, 5.0, 0.0), True),
+    ],
+)
+def test_a_constant_force_is_not_told_from_friction_by_direction(
+    free: str, machine: tuple[float, float, float], told: bool
+) -> None:
+    """Friction of 5 N aft and 3 N forward was 4 N and -1 N of offset, without a word."""
+    keys = ("loader.friction_N", f"loader.{free}")
+    rig = slide().changed(
+        {f"controls.column.loader.{k}": v for k, v in (("mass_kg", 8.0), (DAMPING_KEY, DAMPING))}
+    )
+    fitted = fit_nominal(rig, {"r": rubbed_by_direction(*machine)}, keys)
+    words = [one.words for one in fitted.alike]
+    assert any("friction by direction acts as a constant force" in each for each in words) is told
 
 
 def imposed_with_rests(rest_N: float) -> Record:
