@@ -19,23 +19,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from coupled.errors import InputError, nearest
+from coupled.errors import InputError
 from coupled.gap.checks import at_rate_of, check_record, check_units, trimmed
 from coupled.gap.effects.effect import (
     BY_REGRESSOR,
     Effect,
-    declared_bounds,
     dotted,
     entry,
-    fields_of,
     keys_of,
     possible,
-    section_of,
     touched,
     value,
     value_of,
 )
-from coupled.gap.effects.library import BY_NAME, EFFECTS, LAG
+from coupled.gap.effects.library import BY_NAME, LAG
 from coupled.gap.effects.linkage import SERVO
 from coupled.gap.effects.settings import (
     CLOCK,
@@ -46,6 +43,7 @@ from coupled.gap.effects.settings import (
     is_dry,
     most_yielding,
 )
+from coupled.gap.freed import default_keys, freed
 from coupled.gap.prepare import as_driven, in_own_trims, readers_of
 from coupled.gap.search.case import Case, Tell
 from coupled.gap.search.fit import fit_set
@@ -60,111 +58,25 @@ from coupled.gap.thresholds import (
     MINOR,
     NEGLIGIBLE,
     NORMAL_95,
-    SERVO_START_Hz,
+    CLOCK_s,
 )
 from coupled.record.channels import ControlName, unit_of
 from coupled.record.record import Record
 from coupled.results import Plain, TableResult, frame_of
 from coupled.rig.rig import Rig
-from coupled.schema import LARGEST, Section
 
 if TYPE_CHECKING:
     import polars as pl
 
-# The stage of a key by its section; keys of the loader with a prefix of `OF_LINKAGE`: linkage.
-STAGE_OF_SECTION = {
-    "loader": "loader",
-    "schedule": "schedule",
-    "sensing": "sensing",
-    "rigging": "surface",
-    "flight": "airframe",
-}
-OF_LINKAGE = ("servo", "bend", "play", "arc", "structur", "contact")
-# The default parameters of a fit, of the loader and of the linkage.
-USUAL_OF_LOADER = (
-    *("mass", "damping", "basic_gradient", "friction", "offset", "delay"),
-    *("regressor_force", "regressor_friction"),
+# A time stamp error of the grip, within the tolerance of a recorder's clocks.
+LATE_GRIP = entry(
+    *("linkage", "setting of the grip's stamp", ("", "")),
+    value("", "loader.servo_delay_s", 0.0, CLOCK_s, 0.0, may_end=True),
 )
-USUAL_OF_LINKAGE = ("servo_frequency", "servo_damping_ratio", "bend", "play")
 # Parameters that imitate presliding friction if the contact is fitted as rigid.
 LIKE_CONTACT = ("loader.delay_s", "loader.play_m", "loader.play_rad")
 FRICTION, OFFSET = "loader.friction_N", "loader.offset_N"
 BY_DIRECTION = ("loader.friction_pull_N", "loader.friction_push_N")
-# Parameters whose value 0 means that the component is absent: a fit stays above 0.
-NONE_AT_ZERO = (
-    *("servo_frequency", "servo_rate_limit", "servo_acceleration_limit", "bend_frequency"),
-    *("bend_limit", "force_limit", "play_stiffness", "stop_aft", "stop_forward"),
-    "friction_stiffness",
-)
-
-
-def default_keys(
-    rig: Rig, control: ControlName, stages: set[str], moved: bool = False
-) -> tuple[str, ...]:
-    """Return the keys that are fitted by default, of the stages that the records can judge.
-
-    A basic gradient of 0 is no spring, a servo frequency of 0 no servo; they are not fitted, nor is
-    a regressor that the file does not name. With imposed motion (`moved`) of the linkage only the
-    play shows.
-    """
-    fields = {f: key for key, f in fields_of(rig, control, "loader").items()}
-    loader = rig.controls[control].loader
-    absent: set[str] = {"basic_gradient"} if loader.basic_gradient == 0.0 else set()
-    if loader.servo_frequency == 0.0:
-        absent |= {"servo_frequency", "servo_damping_ratio"}
-    if loader.regressor is None:
-        absent |= {"regressor_force", "regressor_friction"}
-    usual: tuple[str, ...] = USUAL_OF_LOADER if "loader" in stages else ()
-    linkage: tuple[str, ...] = USUAL_OF_LINKAGE if "linkage" in stages else ()
-    if rig.controls[control].drive == "setpoint":
-        linkage = (*linkage, "servo_delay")  # of a bus, or of the servo's own cycle
-    usual += ("play",) if moved else linkage
-    return tuple(f"loader.{fields[name]}" for name in usual if name not in absent)
-
-
-def freed(rig: Rig, control: ControlName, key: str) -> Effect:
-    """Return the parameter of a key as an effect. Raises InputError if the key has no number."""
-    section, _, last = key.partition(".")
-    if section not in STAGE_OF_SECTION or (section == "flight" and rig.flight is None):
-        hint = nearest(section, STAGE_OF_SECTION)
-        raise InputError("--free", key, f'is no number to fit: give "loader.mass_kg"; {hint}')
-    if section != "flight" and control not in rig.controls:
-        raise InputError("--free", key, f"the rig has no {control}")
-    fields = fields_of(rig, control, section)
-    if last not in fields:
-        raise InputError("--free", key, f"unknown key; {nearest(last, fields)}")
-    holder = section_of(rig, control, section)
-    filed = getattr(holder, fields[last])
-    if not isinstance(filed, float):
-        raise InputError("--free", key, "is not a single number; only such are fitted")
-    stage = STAGE_OF_SECTION[section]
-    if stage == "loader" and last.startswith(OF_LINKAGE):
-        stage = "linkage"
-    start = filed or _usual_start(key, control)
-    low, high = _bounds(holder, fields[last], start)
-    number = value("", key, low, high, min(max(start, low), high))
-    return entry(stage, key, ("", ""), number)
-
-
-def _usual_start(key: str, control: ControlName) -> float:
-    """Return the library's start value of a key, for a value of 0 in the file."""
-    if key == SERVO:
-        return SERVO_START_Hz
-    for effect in EFFECTS:
-        for p in effect.free:
-            if p.key_on(control) == key and p.mode in ("added", "value") and not p.is_limit:
-                return p.starts[0]
-    return 1.0
-
-
-def _bounds(holder: Section, field: str, start: float) -> tuple[float, float]:
-    """Return the bounds of a field from its declaration."""
-    far = FAR * abs(start)
-    low, high = declared_bounds(holder, field)
-    above = any(hasattr(bound, "gt") for bound in type(holder).model_fields[field].metadata)
-    if above or field in NONE_AT_ZERO:
-        low = max(low, 1e-3 * abs(start))
-    return max(low, -far), min(high, far, LARGEST)
 
 
 @dataclass(frozen=True)
@@ -470,6 +382,7 @@ class _Fitter:
         beside = [CLOCK] if loader and timed.isdisjoint(keys_of(effects)) else []
         priors = {CLOCK.value_key(number): (0.0, number.high / NORMAL_95)}
         start = start or {}
+        beside += self._late_grip(effects)
         case = Case(self.rig, self.control, outputs)
         rigid = fit_set(case, effects, beside, priors, start, part=part)
         if not (loader and self._contact(case, effects)):
@@ -484,6 +397,18 @@ class _Fitter:
             left, soft = longer if longer[0] < (1.0 - LESSER) * left else (left, soft)
         ours = touched(outputs, self._contact(case, effects))
         return soft if left < (1.0 - LESSER) * _held_out_rms(ours, rigid.rig) else rigid
+
+    def _late_grip(self, effects: Sequence[Effect]) -> list[Effect]:
+        """Return a delay of the grip within the tolerance of time stamps, beside a linkage.
+
+        Without a servo nothing else makes δ late, and a delay of microseconds is fitted as play.
+        """
+        free = [p.key for effect in effects if effect.stage == "linkage" for p in effect.free]
+        judged = any(output.stage == "linkage" for output in self.outputs)
+        if not (free and judged) or any("servo" in key for key in free):
+            return []
+        none = self.rig.controls[self.control].loader.servo_frequency == 0.0
+        return [LATE_GRIP] if none else []
 
     def _yielding(
         self,

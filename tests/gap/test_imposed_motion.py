@@ -11,7 +11,8 @@ import pytest
 from coupled.gap.diagnose import diagnose
 from coupled.gap.effects.library import EFFECTS
 from coupled.gap.findings.proposal import next_tests, pushes
-from coupled.gap.nominal import default_keys, fit_nominal
+from coupled.gap.freed import default_keys
+from coupled.gap.nominal import fit_nominal
 from coupled.gap.prepare import as_driven, readers_of
 from coupled.gap.search.found import Candidate, Choice, Fit, Found
 from coupled.gap.stages.tried import as_judged

@@ -170,6 +170,33 @@ def test_friction_that_yields_before_it_slips_is_not_fitted_as_mass() -> None:
     assert fitted.rig.controls["column"].loader.friction_stiffness == 0.0  # as in a diagnosis
 
 
+@pytest.mark.parametrize(("late_s", "play_m"), [(2e-5, 0.0), (0.0, 2e-5), (2e-5, 2e-5)])
+def test_a_grip_that_is_read_late_has_no_play(late_s: float, play_m: float) -> None:
+    """A delay of 20 µs was a play of 3 µm, with an interval of 2.4 to 3.4 µm."""
+    rng = np.random.default_rng(4)
+    time = np.arange(round(20.0 * RATE_Hz)) / RATE_Hz
+
+    def way(at: np.ndarray) -> np.ndarray:
+        return 0.03 * np.sin(1.5 * at) + 0.005 * np.sin(11.0 * at)
+
+    fine = np.arange(10 * len(time)) / (10 * RATE_Hz) - late_s
+    grip, grips = 0.0, np.empty(len(fine))
+    for k, at in enumerate(way(fine).tolist()):
+        grip = grips[k] = min(max(grip, at - 0.5 * play_m), at + 0.5 * play_m)
+    pull = 1000.0 * way(time)
+    record = recorded(
+        RATE_Hz,
+        force_N=pull + rng.normal(0.0, 0.01, len(time)),
+        computed_m=way(time) + rng.normal(0.0, 1e-6, len(time)),
+        deflection_m=grips[::10] + 1e-5 * pull + rng.normal(0.0, 1e-6, len(time)),
+    )
+    keys, none = ["loader.bend_m_per_N", "loader.play_m"], {"servo_frequency_Hz": 0.0}
+    bend, play = fit_nominal(plain_rig(RATE_Hz, none, 1000.0), {"r": record}, keys).numbers
+    assert bend.found == pytest.approx(1e-5, rel=0.01)
+    assert play.found == pytest.approx(play_m, rel=0.1)
+    assert (play.half is None) is (play_m == 0.0)
+
+
 STIFFNESS_KEY = "loader.friction_stiffness_N_per_m"
 
 

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from coupled.errors import InputError
 from coupled.gap.chain import Part
 from coupled.gap.diagnose import diagnose
-from coupled.gap.nominal import default_keys, fit_nominal
+from coupled.gap.freed import default_keys
+from coupled.gap.nominal import fit_nominal
 from coupled.gap.prepare import prepare
 from coupled.plots.gapview import View
 from coupled.plots.signatures import draw_signature
