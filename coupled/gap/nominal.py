@@ -3,8 +3,9 @@
 Any parameter of a rig can be free, by its key, within its valid range. The free parameters are
 fitted like effects (`fit`), with the stages driven by the measured inputs. Their intervals follow
 from the scatter of the score between stretches, or from the scatter of the values between records
-if that is larger. Parameters with nearly proportional signatures are not identifiable: for example
-friction and damping, if all motion has one speed.
+if that is larger. If a record fits well alone but not with the others, the parameters are means of
+those of each record. Parameters with nearly proportional signatures are not identifiable: for
+example friction and damping, if all motion has one speed.
 
 A parameter that the records do not determine to its own size stays as filed. If it is filed as 0
 the machine is taken not to have the component, and the upper limit of its size is stated.
@@ -48,7 +49,7 @@ from coupled.gap.prepare import as_driven, in_own_trims, readers_of
 from coupled.gap.search.case import Case, Tell
 from coupled.gap.search.fit import fit_set
 from coupled.gap.search.found import Alike, Fit, alike
-from coupled.gap.signals.output import Output, Part, explained_below
+from coupled.gap.signals.output import Floats, Output, Part, explained_below
 from coupled.gap.stages.airframe import airframe_outputs
 from coupled.gap.stages.tried import as_judged
 from coupled.gap.thresholds import (
@@ -320,6 +321,20 @@ def fit_nominal(
     )
 
 
+def random_effects(values: Floats, errors: Floats) -> tuple[float, float, float]:
+    """Return the mean of values with standard errors, its own error, and the scatter between them.
+
+    The scatter is the standard deviation beyond these errors, by the method of moments.
+    """
+    weights = errors**-2.0
+    mean = float(np.average(values, weights=weights))
+    excess = float(weights @ (values - mean) ** 2) - (len(values) - 1)
+    between = max(excess / float(weights.sum() - (weights @ weights) / weights.sum()), 0.0)
+    weights = 1.0 / (errors**2 + between)
+    mean = float(np.average(values, weights=weights))
+    return mean, float(weights.sum()) ** -0.5, math.sqrt(between)
+
+
 @dataclass(frozen=True)
 class _Fitter:
     """Fits parameters of a rig to some outputs; `way` is the rms of the motion, 0 if unknown."""
@@ -352,8 +367,40 @@ class _Fitter:
             self._say(f"fitting to record {i + 1} alone", i + 2, tasks)
             ours = [output for output in self.outputs if output.record == record]
             each[record] = self._fit(effects, ours, whole.values)
-        alone = list(each.values())
-        return held, whole, [self._number(one, whole, alone) for one in effects], each
+        numbers = [self._number(one, whole, list(each.values())) for one in effects]
+        if self._records_differ(whole, each):
+            fits = list(each.values())
+            numbers = [
+                self._mean(one, number, fits) for one, number in zip(effects, numbers, strict=True)
+            ]
+        return held, whole, numbers, each
+
+    def _records_differ(self, whole: Fit, each: Mapping[int, Fit]) -> bool:
+        """Tell whether a record has a residual beyond noise only in the fit to all records."""
+
+        def differs(output: Output) -> bool:
+            gap = output.gap(whole.rig)
+            alone = output.gap(each[output.record].rig)
+            return gap > output.limit and alone < (1.0 - LESSER) * gap
+
+        return any(differs(output) for output in self.outputs)
+
+    def _mean(self, effect: Effect, number: Number, each: Sequence[Fit]) -> Number:
+        """Return a parameter with the mean over records that differ, and its scatter.
+
+        One rig for all of them would be biased in every parameter: friction that differs by a tenth
+        is fitted as mass and damping. The mean is that of random effects (DerSimonian and Laird,
+        Controlled Clinical Trials 7, 1986), with the interval of a further record.
+        """
+        name = effect.value_key(effect.free[0])
+        known = [one for one in each if math.isfinite(one.high[name] - one.low[name])]
+        values = np.array([one.values[name] for one in known])
+        halves = np.array([0.5 * (one.high[name] - one.low[name]) for one in known])
+        if number.half is None or len(known) < 2 or not halves.all():
+            return number
+        mean, error, scatter = random_effects(values, halves / NORMAL_95)
+        half = max(NORMAL_95 * error, 2.0 * scatter)
+        return replace(number, found=mean, half=half, at_bound=False)
 
     def _say(self, what: str, done: int, tasks: int) -> None:
         if self.tell is not None:

@@ -11,7 +11,7 @@ import pytest
 
 from coupled.errors import InputError
 from coupled.gap.diagnose import diagnose
-from coupled.gap.nominal import NominalFit, Number, fit_nominal
+from coupled.gap.nominal import NominalFit, Number, fit_nominal, random_effects
 from coupled.record.record import Record, read_record, write_record
 from coupled.rig.rig import Rig
 from coupled.rig.rigedit import differences, edited
@@ -139,7 +139,11 @@ def test_a_rest_does_not_count_as_sliding(rest_N: float) -> None:
 
 
 def sprung(
-    seconds: float = 20.0, rate_Hz: float = 100.0, steps: int = 20, yields_m: float = 1e-4
+    seconds: float = 20.0,
+    rate_Hz: float = 100.0,
+    steps: int = 20,
+    yields_m: float = 1e-4,
+    dry_N: float = FRICTION_N,
 ) -> Record:
     """Return a record of a mass on a spring whose friction yields (Dahl), by Euler."""
     time = np.arange(round(seconds * rate_Hz * steps)) / (rate_Hz * steps)
@@ -152,7 +156,7 @@ def sprung(
             read[k // steps] = force, place
         speed += (force - DAMPING * speed - 1000.0 * place - held) / MASS_kg * time[1]
         place += speed * time[1]
-        slips = math.copysign(FRICTION_N, speed)
+        slips = math.copysign(dry_N, speed)
         held = slips + (held - slips) * math.exp(-abs(speed) * time[1] / yields_m)
     read += (0.05, 5e-6) * np.random.default_rng(7).standard_normal(read.shape)
     return recorded(rate_Hz, force_N=read[:, 0], computed_m=read[:, 1])
@@ -168,6 +172,30 @@ def test_friction_that_yields_before_it_slips_is_not_fitted_as_mass() -> None:
         assert number.width < 0.05
     assert fitted.channels[0].after < 1.1 * fitted.channels[0].floor
     assert fitted.rig.controls["column"].loader.friction_stiffness == 0.0  # as in a diagnosis
+
+
+@pytest.mark.slow
+def test_friction_that_differs_between_records_is_not_fitted_as_mass() -> None:
+    """One friction for all gave a mass of 7.7 kg for 8, and its interval excluded 8."""
+    rig = plain_rig(100.0, {"mass_kg": 6.0, "damping_N_s_per_m": 20.0}, 1000.0)
+    levels = (4.0, 4.5, 3.7, 4.4)
+    fitted = fit_nominal(rig, {str(dry): sprung(dry_N=dry) for dry in levels}, KEYS)
+    mass, damping, friction = fitted.numbers
+    for number, real in ((mass, MASS_kg), (damping, DAMPING), (friction, np.mean(levels))):
+        assert number.interval is not None
+        assert number.interval[0] < real < number.interval[1]
+    assert mass.width < 0.03
+    assert friction.interval is not None
+    assert friction.interval[0] < min(levels)
+    assert friction.interval[1] > max(levels)
+
+
+def test_the_mean_of_random_effects_weighs_values_by_their_errors() -> None:
+    """Two values by hand: between² = (Q − 1)/(Σw − Σw²/Σw), 1/s² = 1/(error² + between²)."""
+    mean, error, scatter = random_effects(np.array([1.0, 3.0]), np.array([0.5, 0.5]))
+    assert (mean, error, scatter) == pytest.approx((2.0, 1.0, math.sqrt(1.75)))
+    mean, error, scatter = random_effects(np.array([1.0, 1.1]), np.array([0.1, 10.0]))
+    assert (mean, error, scatter) == pytest.approx((1.00001, 0.1, 0.0), rel=1e-3)
 
 
 @pytest.mark.parametrize(("late_s", "play_m"), [(2e-5, 0.0), (0.0, 2e-5), (2e-5, 2e-5)])
