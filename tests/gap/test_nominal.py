@@ -69,7 +69,7 @@ def test_motion_at_one_speed_does_not_tell_friction_from_damping() -> None:
     fitted = fit_nominal(slide(), {"r": moved([0.1] * 5)}, KEYS)
     [one] = fitted.alike
     assert set(one.keys) == {"loader.damping_N_s_per_m", "loader.friction_N"}
-    assert one.words.startswith("all motion is at one speed: ")
+    assert one.words.startswith("the speeds differ too little: ")
     numbers = found(fitted)
     both = numbers["loader.friction_N"] + 0.1 * numbers["loader.damping_N_s_per_m"]
     assert both == pytest.approx(FRICTION_N + 0.1 * DAMPING, rel=0.03)

@@ -96,10 +96,10 @@ class Choice:
 
 # Why two numbers may act alike, by the last parts of their keys.
 WHY = {
-    frozenset(("friction", "damping")): "all motion is at one speed",
-    frozenset(("friction", "offset")): "all motion is in one direction",
-    frozenset(("mass", "basic_gradient")): "all motion is at one frequency",
-    frozenset(("servo_frequency", "servo_damping_ratio")): "all motion is slow beside the servo",
+    frozenset(("friction", "damping")): "the speeds differ too little",
+    frozenset(("friction", "offset")): "the motion is too much in one direction",
+    frozenset(("mass", "basic_gradient")): "the frequencies differ too little",
+    frozenset(("servo_frequency", "servo_damping_ratio")): "the motion is slow beside the servo",
 }
 
 
