@@ -92,6 +92,7 @@ def test_breakout_and_friction_that_depend_on_the_pressure_are_doubtful(tmp_path
     assert doubt.startswith("breakout and friction depend on q̄: ") and "at 3000 Pa" in doubt
 
 
+@pytest.mark.slow
 def test_the_readings_of_a_fit_are_limited_by_means(tmp_path: Path) -> None:
     sweep = read_sweep(column_sweep(tmp_path, readings=4000), "column")
     assert len(sweep.force) == 400 * len(FORCES)
@@ -110,6 +111,7 @@ def test_readings_in_another_order_than_the_sweeps_are_refused(tmp_path: Path) -
         read_sweep(path, "column")
 
 
+@pytest.mark.slow
 def test_exact_readings_give_the_exact_curve(tmp_path: Path) -> None:
     found = fitted(column_sweep(tmp_path, noise=0.0))
     assert found.breakout_N == pytest.approx(BREAKOUT_N, abs=0.05)

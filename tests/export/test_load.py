@@ -178,6 +178,7 @@ def loaded_by(own: Path, **keys: float) -> Export:
     return export(shipped("t37", {"flight.model_folder": str(own), **given}), file="mine.toml")
 
 
+@pytest.mark.slow
 def test_only_the_numbers_of_a_model_are_changed(own: Path) -> None:
     """Comments and layout stay; a section in a file of its own is changed there."""
     path = own / "T37/T37.xml"
@@ -229,6 +230,7 @@ def test_a_load_that_the_model_does_not_take_is_refused(
         loaded_by(own, **keys)
 
 
+@pytest.mark.slow
 def test_what_only_the_scripts_set_is_said(tmp_path: Path) -> None:
     rig = shipped_rigs()["t37"].read_text(encoding="utf-8")
     assert "[flight]\n" in rig

@@ -334,6 +334,7 @@ def test_what_an_aircraft_alone_cannot_be_asked_is_refused(healthy: Record) -> N
         judge(alone(), {"log": healthy}, healthy={"well": healthy})
 
 
+@pytest.mark.slow
 def test_a_number_of_an_aircraft_alone_is_fitted_at_the_rate_of_the_log(healthy: Record) -> None:
     slow = Record(healthy.channels, healthy.data[::2])
     (number,) = fit(alone(), slow, free=["flight.pitch_damping"]).numbers
@@ -421,6 +422,7 @@ def test_an_axis_that_a_log_does_not_show_is_named(healthy: Record) -> None:
     assert unjudged_axes(airframe_outputs(rig, still), [still]) == [said]
 
 
+@pytest.mark.slow
 def test_a_rig_of_wide_steps_is_flown_with_those_that_fit_the_log(tmp_path: Path) -> None:
     record = import_log(flown(tmp_path, {"/Clp": 0.9}, 8.0, rate_Hz=40.0)[0])[0]
     trims, _ = trimmed(alone().changed({"frame_rate_Hz": 40.0}), {"log": record})

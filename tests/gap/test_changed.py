@@ -123,6 +123,7 @@ def test_a_healthy_machine_of_another_day_is_as_it_was() -> None:
     assert "is detectable" in days[0].words
 
 
+@pytest.mark.slow
 def test_an_offset_is_shown_below_the_scatter_of_the_friction() -> None:
     """Friction scatters by 0.6 N; an offset of 1 N moves the mean of both directions alone."""
     found = compared(WELL, [screw(30, offset_N=1.0)])

@@ -62,6 +62,7 @@ def searched(rig: Rig, record: Record, library: Sequence[Effect]) -> Choice:
     return search_sets(replace(case, outputs_with_noise_of=None), library)[1]
 
 
+@pytest.mark.slow
 def test_an_unexplained_airframe_says_that_its_functions_were_not_tried(
     cessna: Rig, worn: Record, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -247,6 +247,7 @@ def test_friction_may_yield_further_than_in_a_diagnosis() -> None:
     assert free.rig.controls["column"].loader.friction_stiffness == found(free)[STIFFNESS_KEY]
 
 
+@pytest.mark.slow
 def test_a_fit_that_lacks_what_the_machine_has_is_doubtful() -> None:
     """The interval of the gradient excluded it beside a spring that hardens, without a word."""
     rig = plain_rig(100.0, {"mass_kg": 0.8, "damping_N_s_per_m": 2.0}, 3000.0)
@@ -257,6 +258,7 @@ def test_a_fit_that_lacks_what_the_machine_has_is_doubtful() -> None:
     assert not fit_nominal(rig, records, [*keys, "loader.cubic_N_per_m3"]).doubts
 
 
+@pytest.mark.slow
 def test_what_differs_between_records_is_no_reason_for_doubt() -> None:
     """Friction of 4 and of 5 N: the fit to both misses each, and its interval holds both."""
     fitted = fit_nominal(

@@ -72,6 +72,7 @@ def held(rig: Rig, seed: int, tmp_path: Path) -> Record:
     return fly(Manoeuvre(noisy, {"column": pilot}, 30.0, seed=seed, bench=still))
 
 
+@pytest.mark.slow
 def test_noise_of_a_held_force_walks_no_contact(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -100,6 +100,7 @@ def test_friction_is_found_over_eight_decades_of_force(force: float) -> None:
     assert value / force == pytest.approx(14.0, rel=0.02)
 
 
+@pytest.mark.slow
 def test_a_test_is_proposed_by_the_sensors_that_the_record_has() -> None:
     """Scales of force and of δc were to be told apart by a transducer that the bench lacks."""
     rig = plain_rig(100.0, {"mass_kg": 1.0, "damping_N_s_per_m": 30.0}, 500.0)

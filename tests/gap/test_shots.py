@@ -137,10 +137,12 @@ def test_a_throttle_that_moves_leaves_drag_and_thrust_unjudged(rig: Rig, healthy
         assert ("drag and thrust, cannot be judged" in said) == (moved > 0.0)
 
 
+@pytest.mark.slow
 def test_a_complete_record_says_nothing_of_the_kind(rig: Rig, healthy: Record) -> None:
     assert prepare(rig, {"r": healthy}, Part("column")).left_out == ()
 
 
+@pytest.mark.slow
 def test_late_stamps_of_the_motion_delay_its_restarts_too(rig: Rig, healthy: Record) -> None:
     """The motion of a record, read three frames late."""
     data, motion = healthy.data.copy(), [*NEEDS, "load_factor", "altitude_m"]

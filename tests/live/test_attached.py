@@ -100,6 +100,7 @@ def test_forces_fade_while_a_measurement_cannot_be_true(
     assert ordered == {0.0}
 
 
+@pytest.mark.slow
 def test_a_missing_sample_is_marked_and_does_not_change_the_estimate() -> None:
     def lose(time_s: float, now: Measured) -> Measured | None:
         return None if time_s > 1.0 and round(time_s * RIG.frame_rate) % 50 == 0 else now

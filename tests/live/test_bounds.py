@@ -67,6 +67,7 @@ def test_connections_are_bounded_and_a_slow_one_is_not_waited_for(page: Any) -> 
         viewer.send('{"what": "mark"}')
 
 
+@pytest.mark.slow
 def test_a_ninth_viewer_is_refused(page: Any) -> None:
     with ExitStack() as viewers:
         for _ in range(server.MOST_VIEWERS):

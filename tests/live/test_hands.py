@@ -156,6 +156,7 @@ def test_a_service_set_live_is_recorded_as_the_event_of_a_run() -> None:
     assert np.array_equal(quiet.data, fly(plain).data)
 
 
+@pytest.mark.slow
 def test_a_bench_is_flown_live_too() -> None:
     record = fly_live(rig_live("bench", 1.0), Plan(paced=False, hand_positions=Wanted())).record
     assert len(record) > 50
@@ -172,6 +173,7 @@ def test_an_impossible_duration_is_refused() -> None:
         run_live("capture", "no such", None, "pilot")
 
 
+@pytest.mark.slow
 def test_a_trim_released_live_keeps_its_spring_and_damper_as_in_a_run() -> None:
     kept = {"trim_release_gradient_N_per_m": 200.0, "trim_release_damping_N_s_per_m": 60.0}
     plain = rig_live("report-column", 3.0)

@@ -52,6 +52,7 @@ def test_a_model_that_does_not_trim_has_the_reason() -> None:
     assert "m/s² backwards remain with no more thrust from the throttle" in glider.why
 
 
+@pytest.mark.slow
 def test_a_law_of_the_models_own_is_told_from_direct_controls() -> None:
     found = survey(chosen_model("f16"))
     assert found.controls
@@ -89,6 +90,7 @@ TAILS = """
 </flight_control>"""
 
 
+@pytest.mark.slow
 def test_a_surface_of_other_names_is_found(tmp_path: Path) -> None:
     """A stabilator of two halves, one in degrees; a tab that moves otherwise is none of them."""
     shutil.copytree(MODELS["T37"] / "T37", tmp_path / "T37")
@@ -140,6 +142,7 @@ def test_the_command_lists_models_and_writes_a_rig(tmp_path: Path) -> None:
     assert read_rig(tmp_path / "first.toml").flight is not None
 
 
+@pytest.mark.slow
 def test_a_rig_is_written_for_the_folder_of_a_model(tmp_path: Path) -> None:
     shutil.copytree(MODELS["J3Cub"] / "J3Cub", tmp_path / "mycub")
     (tmp_path / "mycub" / "J3Cub.xml").rename(tmp_path / "mycub" / "mycub.xml")
@@ -179,6 +182,7 @@ def test_a_folder_of_models_is_listed_with_variants(variants: Path) -> None:
     ]
 
 
+@pytest.mark.slow
 def test_a_rig_is_written_for_the_file_of_a_variant(variants: Path) -> None:
     done = coupled(variants, "new", "rig", "Tweet/t37b.xml")
     assert done.returncode == 0, done.stderr

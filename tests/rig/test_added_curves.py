@@ -298,6 +298,7 @@ def test_a_force_through_a_damping_of_several_segments_settles_at_its_speed() ->
         assert 75.0 * abs(speed) + level == pytest.approx(abs(force), rel=1e-9)
 
 
+@pytest.mark.slow
 def test_an_imposed_motion_is_answered_with_damping_and_spring_of_curves() -> None:
     time = np.arange(400) / RATE_Hz
     way = 0.05 * np.sin(8.0 * time)

@@ -94,6 +94,7 @@ def test_a_comparison_says_what_rests_on_guesses(tmp_path: Path) -> None:
     assert "Guesses" in " ".join(draw_comparison(flights).get_suptitle().split())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "report"),
     [
