@@ -151,6 +151,12 @@ def nearest(word: str, known: Iterable[str]) -> str:
     return "known: " + listed(sorted(names)[:LISTED]) + more
 
 
+def joined(words: Sequence[str]) -> str:
+    """Return words as a list in prose: a, b and c."""
+    *first, last = words
+    return f"{', '.join(first)} and {last}" if first else last
+
+
 def listed(names: Iterable[str]) -> str:
     """Return names separated by commas; names that contain a comma are quoted."""
     return ", ".join(_quoted(shown(name)) for name in names)

@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from coupled.errors import InputError, nearest
+from coupled.errors import InputError, joined, nearest
 from coupled.flight.aircraft import make_aircraft
 from coupled.flight.altered import STILL
 from coupled.flight.everyframe import PROPERTIES
@@ -263,7 +263,7 @@ def not_measured(
     set_points: bool = False,
     motion: Collection[str] = (),
 ) -> list[str]:
-    """Return a sentence on each sensor of a control, or of the motion, that repeats its readings.
+    """Return sentences on the sensors of a control, or of the motion, that repeat their readings.
 
     A force may be applied in steps, and δc if it is a set point; they are longer than those of the
     slowest log. Rows that the import has interpolated have a sentence too.
@@ -273,10 +273,14 @@ def not_measured(
     rate_Hz = sampling_rate_of(record, file)
     applied = ("force", "computed") if set_points else ("force",)
     most = {} if control is None else {channel(control, q): rate_Hz / RATES_Hz[0] for q in applied}
+    repeating = dict[str, list[str]]()
+    for name, signal in signals.items():
+        if repeats := plausible.held(signal, most.get(name, math.inf)):
+            repeating.setdefault(repeats, []).append(name)
     said = [
-        f"{name} of {file} {repeats}: an effect may be the recorder's. Log new readings only."
-        for name, signal in signals.items()
-        if (repeats := plausible.held(signal, most.get(name, math.inf)))
+        f"{'Each of ' if len(names) > 1 else ''}{joined(names)} of {file} {repeats}: an effect may "
+        "be the recorder's. Log new readings only."
+        for repeats, names in repeating.items()
     ]
     log_Hz = log_rate_of(record)
     if log_Hz is not None and log_Hz < (1.0 - SMALL) * rate_Hz:

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from scipy.spatial import ConvexHull, Delaunay, QhullError
 
 from coupled.display import System, in_system, pressure_shown
+from coupled.errors import joined
 from coupled.plots.pages import BLUE, GRAY, GREEN, ORANGE, deflection_shown, panels, with_legend
 from coupled.record.channels import ControlName
 from coupled.units import POUND_N, KNOT_m_per_s
@@ -84,13 +85,9 @@ def _without_loss(maps: Mapping[ControlName, Sequence[LossMap]]) -> list[str]:
         why, _, name = place.partition(" on the ")
         alike.setdefault((why, tuple(configurations)), []).append(name)
     return [
-        f"{why} on {_join_with_and(controls)}, {_join_with_and(configurations)}."
+        f"{why} on {joined(controls)}, {joined(configurations)}."
         for (why, configurations), controls in alike.items()
     ]
-
-
-def _join_with_and(words: Sequence[str]) -> str:
-    return " and ".join(filter(None, (", ".join(words[:-1]), words[-1])))
 
 
 def _draw_row(

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
-from coupled.errors import InputError
+from coupled.errors import InputError, joined
 from coupled.record.channels import ControlName, unit_of
 from coupled.rig.parameters import Control
 from coupled.schema import Section, file_keys
@@ -56,7 +56,7 @@ def _in_a_row(names: Sequence[str]) -> str:
     """Return the first of some names and how many more there are."""
     if len(names) > _NAMED + 1:
         names = [*names[:_NAMED], f"{len(names) - _NAMED} more"]
-    return ", ".join(names[:-1]) + (" and " if len(names) > 1 else "") + names[-1]
+    return joined(names)
 
 
 def _names(control: Control, d: str, varied: Collection[str]) -> list[str]:

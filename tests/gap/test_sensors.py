@@ -94,6 +94,14 @@ def test_what_a_bench_applies_in_long_steps_is_measured(
     assert len(said) == count
 
 
+def test_sensors_that_hold_their_values_alike_are_named_together() -> None:
+    data = moved(1.0).data.copy()
+    data[:, 1:] = data[np.arange(len(data)) // 4 * 4, 1:]
+    (said,) = not_measured(Record(NAMES, data), "column", "r.csv")
+    names = "column_force_N, column_computed_m and column_deflection_m"
+    assert said.startswith(f"Each of {names} of r.csv holds each value over 4 rows: ")
+
+
 @pytest.mark.slow
 def test_an_effect_beside_a_sensor_that_holds_its_value_is_as_probably_the_recorders(
     tmp_path: Path,

@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 
 from coupled.display import split_unit
+from coupled.errors import joined
 from coupled.gap.chain import BY_NAME as STAGE_OF
 from coupled.gap.chain import stage_of
 from coupled.gap.findings.budget import ChannelShrink, channel_shrink
@@ -45,7 +46,7 @@ from coupled.gap.findings.curvefit import (
     with_nodes,
 )
 from coupled.gap.findings.result import EffectResult
-from coupled.gap.findings.summary import joined, plain
+from coupled.gap.findings.summary import plain
 from coupled.gap.findings.where import signals
 from coupled.gap.noise.noise import rms_of
 from coupled.gap.noise.smooth import smoothed

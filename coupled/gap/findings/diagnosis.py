@@ -19,6 +19,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from coupled.arguments import public
+from coupled.errors import joined
 from coupled.gap.chain import STAGES, Part
 from coupled.gap.effects.effect import Effect, keys_of
 from coupled.gap.effects.library import EFFECTS
@@ -42,7 +43,6 @@ from coupled.gap.findings.summary import (
     NOISE,
     capital,
     filtered_words,
-    joined,
     no_gap_in,
     summary,
 )

@@ -16,7 +16,7 @@ from typing import Any, Literal
 import numpy as np
 
 from coupled.display import percent, split_unit
-from coupled.errors import InputError
+from coupled.errors import InputError, joined
 from coupled.flight.gusts import DRAWN, GivenAir
 from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import Manoeuvre, PressureProfile
@@ -26,7 +26,7 @@ from coupled.gap.chain import AIRFRAME
 from coupled.gap.effects.library import BY_NAME
 from coupled.gap.findings.budget import shapley_subsets
 from coupled.gap.findings.result import labelled
-from coupled.gap.findings.summary import joined, plain
+from coupled.gap.findings.summary import plain
 from coupled.gap.noise.noise import rms_of
 from coupled.gap.noise.smooth import smoothed
 from coupled.gap.signals.output import Floats

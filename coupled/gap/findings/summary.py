@@ -10,6 +10,7 @@ from dataclasses import replace
 from typing import Any
 
 from coupled.display import System, in_system, split_unit, unit_in
+from coupled.errors import joined
 from coupled.gap.chain import AIRFRAME
 from coupled.gap.effects.airframe import TERM
 from coupled.gap.effects.effect import Switch, dotted
@@ -241,12 +242,6 @@ def _settings(found: Findings) -> str:
                 f" {joined(off)}, each within its tolerance: the stage is not faulty."
             )
     return " ".join(said)
-
-
-def joined(words: Sequence[str]) -> str:
-    """Return words as a list in prose: a, b and c."""
-    *first, last = words
-    return f"{', '.join(first)} and {last}" if first else last
 
 
 def _since(found: Findings) -> str:

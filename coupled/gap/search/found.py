@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from coupled.errors import joined
 from coupled.gap.effects.effect import Effect
 from coupled.gap.search.descent import Slope
 from coupled.gap.signals.output import Floats
@@ -114,9 +115,8 @@ class Alike:
     def words(self) -> str:
         """What is to be said of them."""
         count = {2: "one number", 3: "two numbers"}.get(len(self.keys), "fewer numbers")
-        names = " and ".join((", ".join(self.keys[:-1]), self.keys[-1]))
         because = f"{self.why}: " if self.why else ""
-        return f"{because}{names} are {count} in these records"
+        return f"{because}{joined(self.keys)} are {count} in these records"
 
     def as_dict(self) -> dict[str, Any]:
         """Return the JSON."""
