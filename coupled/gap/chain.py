@@ -18,9 +18,8 @@ class Stage:
 
     The gap of a stage is taken over its `outputs`. An effect of the stage shows in the outputs
     `effects_show_in`, unless the effect has outputs of its own. A stage without outputs shows only
-    in those of its neighbours. If `flown`, a prediction is a flight of the aircraft, and sizes are
-    not scanned. `drive` is the symbol and name of the quantity or channel that drives the stage; an
-    airframe is driven by all surfaces.
+    in those of its neighbours. `drive` is the symbol and name of the quantity or channel that
+    drives the stage; an airframe is driven by all surfaces.
     `color` is of the palette of Okabe and Ito.
     """
 
@@ -28,7 +27,6 @@ class Stage:
     outputs: tuple[str, ...]
     color: str
     effects_show_in: tuple[str, ...]
-    flown: bool = False
     drive: tuple[str, str] = ("", "")
 
 
@@ -39,7 +37,7 @@ CHAIN: tuple[Stage, ...] = (
     Stage("linkage", ("linkage",), "#d55e00", ("linkage",)),
     Stage("compensation", ("compensation",), "#e69f00", ("compensation",)),
     Stage("surface", ("surface",), "#009e73", ("surface",)),
-    Stage("airframe", ("airframe",), "black", ("airframe",), flown=True),
+    Stage("airframe", ("airframe",), "black", ("airframe",)),
 )
 BY_NAME = {stage.name: stage for stage in CHAIN}
 STAGES = tuple(BY_NAME)

@@ -29,8 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtr, stdtrit
 
-from coupled.gap.chain import BY_NAME as STAGE_OF
-from coupled.gap.chain import stage_of
+from coupled.gap.chain import AIRFRAME
 from coupled.gap.effects.effect import Effect
 from coupled.gap.findings.where import free_share, response, signals
 from coupled.gap.noise.smooth import smoothed
@@ -267,7 +266,7 @@ def credibility(
         return replace(plain, exact=True)
     if remains < FEW or not acts or effect.signature.drawing == "time":
         return plain
-    if all(STAGE_OF[stage_of(output)].flown for output in effect.shows_in):
+    if {*effect.shows_in} == {AIRFRAME}:
         return replace(plain, in_full=True)
     most = max(acts, key=lambda one: float(one.action @ one.action))
     return replace(plain, beside_flexible=_beside_flexible(case, found, most))
