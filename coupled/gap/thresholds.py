@@ -185,7 +185,7 @@ DRIFT_CHANCE = 0.01  # error rate of all halves: of 744 right effects of three s
 # doubted, and of 102 wrong ones 76
 
 # The search over sets of effects (`beam`, `evidence`).
-BEAM_WIDTH, BEAM_DEPTH = 6, 4  # step: sets that are extended, and largest depth
+BEAM_WIDTH, BEAM_DEPTH = 6, 4  # step: sets that are extended, and effects of the largest set
 BEAM_CANDIDATES = 8  # step: effects fitted beside the best set; ablated
 GIVEN_UP = 30.0  # step: log evidence behind the best, at which a start or a set is dropped
 BEAM_SIZES = (0.03, 0.3, 1.0, 5.0)  # step: times the start of a parameter, for signatures; ablated

@@ -263,16 +263,18 @@ def _search_from(
 
 
 def _search_by_depth(beam: Beam, library: Sequence[Effect]) -> tuple[dict[str, float], ...]:
-    """Fit the neighbours of the best sets, depth by depth, until one explains every stage.
+    """Fit the neighbours of the best sets, in rounds, until the best set explains every stage.
 
-    The functions of an aircraft model are in a library if a user asks which of them is wrong. One
-    is then tried also where the motion is within its noise (`_choose`). Return the gain in log
-    evidence of each depth's sets, by the effect added.
+    The rounds also end if the best set does not change, or has as many effects as a set may have. A
+    round may be lost to an effect that is then replaced. The functions of an aircraft model are in
+    a library if a user asks which of them is wrong. One is then tried also where the motion is
+    within its noise (`_choose`). Return the gain in log evidence of each round's sets, by the
+    effect added.
     """
     front, best, known = beam.leading(), beam.best, set(beam.fits)
     asked = {output for effect in library if effect.of for output in effect.shows_in}
     depths = list[tuple[Names, set[Names]]]()
-    for _ in range(BEAM_DEPTH):
+    while len(beam.best) < BEAM_DEPTH:
         if not front or (best and not beam.open_outputs(best)):
             break
         for names in front:
