@@ -28,6 +28,8 @@ from coupled.resources import aircraft_folder, shipped_rigs
 from coupled.rig.recorder import ZEROS
 from coupled.rig.rig import Rig
 from coupled.rig.rigfile import read_rig
+from tests.support import threecontrols
+from tests.support.airframes import noisy as noisy_rig
 from tests.support.ownlogs import flown
 
 # Zeros in the order of good sensors, far above the noise of a mean.
@@ -107,6 +109,15 @@ def test_an_aircraft_with_other_fuel_is_named_as_that(tmp_path: Path) -> None:
     assert (found.verdict, effect.name) == ("effect", "fuel")
     assert factor.low is not None and factor.high is not None
     assert factor.low < 0.4 < factor.high < factor.low + 0.1
+
+
+@pytest.mark.slow
+def test_a_mass_is_not_named_as_fuel_in_tanks_at_the_centre_of_gravity() -> None:
+    """In a T-37 the two act alike."""
+    jet = noisy_rig(read_rig(shipped_rigs()["t37"]))
+    record = threecontrols.flown(jet, {"flight.mass": 1.03}, 20.0, pedals=160.0)
+    found = diagnose(jet, {"r": record})
+    assert [effect.name for effect in found.effects] == ["mass"]
 
 
 def test_a_constant_lift_is_added_along_the_lift() -> None:

@@ -106,9 +106,10 @@ def evidence_of(problem: Problem, rig: Rig, error: ModelError, rest: float) -> E
 def log_prior(effect: Effect) -> float:
     """Return the log prior probability of an effect, relative to its absence.
 
-    An effect that changes several quantities of the rig is less likely than one of them alone.
+    An effect that changes several quantities of the rig is as unlikely as that many effects, so
+    that it is named only if no effect of one quantity explains the record.
     """
-    return -PRIOR_EFFECT - PRIOR_NUMBER * (max(len(effect.free), effect.changes) - 1)
+    return -PRIOR_EFFECT * effect.changes - PRIOR_NUMBER * max(len(effect.free) - 1, 0)
 
 
 def _laplace(problem: Problem, members: Sequence[Effect], group: Group) -> float:
