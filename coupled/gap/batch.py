@@ -176,8 +176,8 @@ def answer(
 ) -> tuple[int, str, dict[str, Any]]:
     """Return a job's number, the version that did it, and the JSON of the diagnosis.
 
-    Needs no file, so that any machine can do it. The verdict of a diagnosis that is refused, or
-    fails, says so.
+    Needs no file, so that any machine can do it. A diagnosis that is refused or fails has a verdict
+    for that.
     """
     try:
         document = diagnose(rig, {name: record}, control, workers=1).as_dict()

@@ -140,7 +140,7 @@ def test_what_was_never_measured_is_not_recorded() -> None:
 
 
 def test_a_transducer_that_begins_in_flight_gives_no_estimate_of_k() -> None:
-    """The flight has said that δ and K are not recorded."""
+    """The host has printed that δ and K are not recorded."""
     late = flown(lambda t, now: now if t > 2.0 else now._replace(deflection=math.nan))[0].record
     assert "column_deflection_m" not in late
     assert late.manifest["live"]["bend_in_service"]["column"]["bend"] is None

@@ -245,8 +245,8 @@ def remainder(gap: float, left: float, explained_below: float, own: float = 1.0)
     `gap` is the gap without effects, `left` that with them, `explained_below` the largest gap of
     an explained stage. The weight grows with the excess of `left` over it, and with the share of
     the gap that remains: effects that remove nearly all of a large gap are usually correct. `own`
-    is the machine's own error, the gap that a nonparametric model beside the effects leaves too: no
-    function of the stage's signals, and no evidence against a law.
+    is the gap that remains even if a nonparametric model is fitted with the effects. No function of
+    the stage's signals explains it, so it is not evidence against a law.
     """
     error = max(own, 1.0) ** 2
     more, known = max(left**2 - error, 0.0), explained_below**2 - 1.0

@@ -114,8 +114,8 @@ def tolerances(case: Case, found: Fit) -> dict[str, float]:
     """Return the tolerances of the fitted parameters by key, in the keys' units.
 
     They are `SIGMAS` standard deviations between records; of a single record, between its halves,
-    and at least a share of the effect, as both halves have one motion. Parameters that an effect
-    has only beside others stay as fitted: their scatter might absorb a change of another parameter.
+    and at least a share of the effect, as both halves have one motion. Parameters that no
+    effect has alone stay as fitted: their scatter might absorb a change of another parameter.
     """
     numbers = sorted({output.record for output in case.outputs})
     single = len(numbers) == 1

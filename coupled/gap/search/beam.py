@@ -267,9 +267,8 @@ def _search_by_depth(beam: Beam, library: Sequence[Effect]) -> tuple[dict[str, f
 
     The rounds also end if the best set does not change, or has as many effects as a set may have. A
     round may be lost to an effect that is then replaced. The functions of an aircraft model are in
-    a library if a user asks which of them is wrong. One is then tried also where the motion is
-    within its noise (`_choose`). Return the gain in log evidence of each round's sets, by the
-    effect added.
+    a library if the user requests them. Such a function is tried even if the motion is within its
+    noise (`_choose`). Return the gain in log evidence of each round's sets, by the effect added.
     """
     front, best, known = beam.leading(), beam.best, set(beam.fits)
     asked = {output for effect in library if effect.of for output in effect.shows_in}
@@ -603,7 +602,7 @@ def _choose(beam: Beam, rounds: tuple[dict[str, float], ...]) -> Choice:
 
     The probability of an effect is the sum over the sets with it, or with a law that contains it.
     If all outputs are within their noise, the answer is no effect: noise that is not quite as
-    modelled is explained by some effect. Functions of the model, which a user asks for, are the
+    modelled is explained by some effect. Functions of the model, which the user requests, are the
     answer if their evidence is far ahead and all outputs are within their noise with them.
     """
     ranked = beam.ranked()

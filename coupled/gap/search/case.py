@@ -171,8 +171,8 @@ class Case:
     def gaps(self, rig: Rig) -> dict[str, float]:
         """Return each stage's gap, with the higher of the noise floors of the nominal and this rig.
 
-        Presliding friction, for example, passes noise that rigid friction would hold. If the
-        aircraft differs from the nominal one, its trim positions do too: the smaller gap counts.
+        For example, noise moves a loader with presliding friction, but not with rigid friction. If
+        the aircraft differs from the nominal one, so do its trim positions: the smaller gap counts.
         """
         gaps, limits = stage_gaps(self.outputs, rig), stage_limits(self.outputs)
         narrow = all(gap <= limits[stage] for stage, gap in gaps.items())

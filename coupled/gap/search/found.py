@@ -83,7 +83,7 @@ class Choice:
     """The effects of the best set, and their fit.
 
     `without_effects` is the fit of the nuisance parameters alone, within their tolerance; `tried`
-    the gain in log evidence of each effect alone, `rounds` that of each depth's sets by the effect
+    the gain in log evidence of each effect alone, `rounds` that of each round's sets by the effect
     added, `probability` the posterior probability of the best set.
     """
 

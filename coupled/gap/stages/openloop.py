@@ -244,7 +244,7 @@ def _motion(
     """
     each = [airframe.reader(PROPERTIES.get(name, name)) for name in channels]
     step, readers = airframe.step, [read or float for read in each]
-    motion, columns = array("d"), asked.T.tolist()  # a list for each row costs a tenth of a flight
+    motion, columns = array("d"), asked.T.tolist()  # lists of rows take a tenth of the time
     for k, commands in enumerate(zip(*columns, strict=True)):
         now = [read() for read in readers]
         if (state := restarts.get(k)) is not None:

@@ -126,7 +126,7 @@ def test_a_row_without_a_time_can_be_left_out(tmp_path: Path) -> None:
 def test_local_time_that_is_set_by_an_hour_is_named_as_daylight_saving(
     tmp_path: Path, set_h: int, zone: str, what: str
 ) -> None:
-    """The refusal named another run or clock, and rows to leave out."""
+    """Before, the message named another run or clock, and proposed to omit rows."""
     start = datetime.fromisoformat("2025-10-26T02:59:55")
     stamps = [
         start + timedelta(hours=set_h * (row >= 300), seconds=row / 60) for row in range(ROWS)

@@ -244,7 +244,7 @@ def test_a_file_of_one_matrix_is_refused_with_how_to_read_it(tmp_path: Path, kin
 
 @pytest.mark.parametrize("kind", ["h5", "tdms"])
 def test_a_gain_in_the_file_is_asked_about(tmp_path: Path, kind: str) -> None:
-    """No question was asked, and the import refused the map."""
+    """Before, the map had no question about the scale, and the import refused it."""
     path, step = tmp_path / f"log.{kind}", {"wf_increment": 1.0 / 60.0}
     named = {"time_s": TIME_s, "force_N": FORCE_N / 2.5, "column_computed_m": DEFLECTION_m}
     gains = {"force_N": {"gain": 2.5, **step}, "time_s": {"scale": 1e-3}}
