@@ -26,7 +26,6 @@ from coupled.flight.altered import STILL
 from coupled.flight.everyframe import PROPERTIES
 from coupled.gap.signals.output import Floats, Output, estimate_noise
 from coupled.gap.signals.reading import PRESSURE
-from coupled.gap.stages.openloop import throttles_of
 from coupled.gap.stages.surfaces import start_of, surface_channel, surface_points
 from coupled.gap.thresholds import (
     DOUBLED,
@@ -37,6 +36,7 @@ from coupled.gap.thresholds import (
     OTHER_SPEED,
     PIECE,
     REVERSED,
+    ROUGH,
     SHORT_FRAMES,
     SHORT_SWINGS,
     SMALL,
@@ -60,6 +60,7 @@ from coupled.record.importing import plausible
 from coupled.record.importing.account import log_rate_of
 from coupled.record.importing.redundant import force_unit, other_units, rate_ratio, reversed_rates
 from coupled.record.importing.suggest.sizes import RATES_Hz
+from coupled.record.levers import levers_of
 from coupled.record.record import Record
 from coupled.record.samples import FINER, check_samples, sampling_rate_of
 from coupled.resources import aircraft_folder
@@ -576,7 +577,7 @@ def _trim_motion(flight: str, rate_Hz: float, name: str) -> tuple[float, ...]:
 
 
 def motion_alone(records: Mapping[str, Record]) -> dict[str, Record]:
-    """Return the records with time, surface and throttle positions, and motion only.
+    """Return the records with time, the positions of surfaces and levers, and motion only.
 
     Raises InputError if one lacks the elevator position or the pitch rate.
     """
@@ -587,10 +588,18 @@ def motion_alone(records: Mapping[str, Record]) -> dict[str, Record]:
                 problem = "is missing; the rig has an aircraft only, and is judged by it"
                 raise InputError(file, name, problem)
         kept = [name for name in (TIME, *LONGITUDINAL, *LATERAL) if name in record]
-        kept += throttles_of(record)
+        levers = levers_of(record.channels)
+        kept += [name for name in record.channels if name in levers or "throttle" in name]
         data = np.column_stack([record[name] for name in kept])
         found[file] = Record(tuple(kept), data, record.manifest)
     return found
+
+
+def check_levers(record: Record, file: str) -> None:
+    """Raise InputError if a lever of a record is no share of its travel."""
+    for name in levers_of(record.channels):
+        if (most := float(np.max(np.abs(record[name])))) > 1.0 + ROUGH:
+            raise InputError(file, name, f"reaches {most:.4g}; a lever is from 0 to 1: in percent?")
 
 
 def at_rate_of(rig: Rig, records: Mapping[str, Record]) -> Rig:

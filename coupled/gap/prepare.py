@@ -30,6 +30,7 @@ from coupled.gap.chain import AIRFRAME, Part
 from coupled.gap.checks import (
     at_rate_of,
     check_against_model,
+    check_levers,
     check_moved_by_pilot,
     check_record,
     check_trim,
@@ -180,6 +181,7 @@ def prepare(
     rig = next(iter(trims.values()))
     for file, record in records.items():
         check_record(trims[file], record, control, file, moved=part.own)
+        check_levers(record, file)
         if rig.flight is not None:
             check_trim(trim_speed(trims[file]), record, file)
     if not rig.controls:

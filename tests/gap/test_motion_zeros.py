@@ -26,10 +26,10 @@ from coupled.record.importing.convert import import_log
 from coupled.record.record import Record
 from coupled.resources import aircraft_folder, shipped_rigs
 from coupled.rig.recorder import ZEROS
-from coupled.rig.rig import Rig
 from coupled.rig.rigfile import read_rig
 from tests.support import threecontrols
 from tests.support.airframes import noisy as noisy_rig
+from tests.support.alone import alone, gaps, noisy
 from tests.support.ownlogs import flown
 
 # Zeros in the order of good sensors, far above the noise of a mean.
@@ -45,34 +45,10 @@ OFF = {
 }
 
 
-def alone() -> Rig:
-    return read_rig(shipped_rigs()["c172p"]).changed({"controls": {}, "noise": {}})
-
-
-def noisy(record: Record) -> Record:
-    noise = np.random.default_rng(6).normal(scale=3e-4, size=record.data.shape)
-    noise[:, 0] = 0.0
-    for name, times in {
-        "load_factor": 10.0,
-        "true_airspeed_m_per_s": 300.0,
-        "altitude_m": 1e3,
-    }.items():
-        noise[:, record.channels.index(name)] *= times
-    return Record(record.channels, record.data + noise, record.manifest)
-
-
 def offset(record: Record, name: str) -> Record:
     data = record.data.copy()
     data[:, record.channels.index(name)] += OFF[name]
     return Record(record.channels, data, record.manifest)
-
-
-def gaps(rig: Rig, record: Record, zero: dict[str, float]) -> dict[str, float]:
-    """Return the gap of each output for a rig with further keys of the flight."""
-    known = trimmed(rig, {"log": record})[0]["log"]
-    outputs = airframe_outputs(known, record)
-    changes = {f"flight.{key}": value for key, value in zero.items()}
-    return {one.channel: one.gap(known.changed(changes)) for one in outputs}
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import jsbsim
@@ -89,12 +89,14 @@ def flown(
     heading_deg: float = 0.0,
     by_hand: bool = True,
     fuel: float = 1.0,
+    levers: Mapping[str, Callable[[float], float]] | None = None,
 ) -> tuple[Path, Floats]:
     """Fly an edited copy of a model from trim in bare JSBSim, with its own CSV output.
 
     `factors` are on functions by the ends of their names, `controls` how many of elevator, aileron
-    and rudder move, `by_hand` or in jumps, `fuel` in two tanks, of the model's. Returns the CSV
-    file, and the properties at each frame, shape (frames, properties).
+    and rudder move, `by_hand` or in jumps, `fuel` in two tanks, of the model's. `levers` are
+    properties by what is added to their positions in trim at a time in s. Returns the CSV file, and
+    the properties at each frame, shape (frames, properties).
     """
     models = edited_model(folder / "edited", model, multiplied(factors))
     listed = "".join(f"<property>{name}</property>" for name in properties)
@@ -116,10 +118,13 @@ def flown(
     fdm["simulation/do_simple_trim"] = 1
     names = [f"fcs/{name}-cmd-norm" for name in ("elevator", "aileron", "rudder")]
     trim, rows = [fdm[name] for name in names], []
-    for asked in manoeuvre(length_s, by_hand=by_hand)[:, :controls]:
+    begun = {name: (fdm[name], added) for name, added in (levers or {}).items()}
+    for k, asked in enumerate(manoeuvre(length_s, by_hand=by_hand)[:, :controls]):
         rows.append([fdm[name] for name in properties])
         for name, held, moved in zip(names, trim, asked.tolist(), strict=False):
             fdm[name] = held + moved
+        for name, (held, added) in begun.items():
+            fdm[name] = held + added(k / RATE_Hz)
         fdm.run()
     del fdm  # closes its file
     (log,) = folder.glob("*.csv")

@@ -4,6 +4,8 @@ Wind, gusts and events are in the manifest of a record. The conditions of a simu
 known exactly: they act on the model too, and are not reported as effects. They are unknown for
 other records, and for a part of a record that does not begin with the flight.
 
+Throttles, flaps and other levers that a log contains move the model's (`levers`).
+
 The Earth turns, so a flight to the east is lighter than one to the north, by 2·Ω·v. A model starts
 to the north; for a log of another program it starts at the heading of the log.
 """
@@ -17,9 +19,11 @@ import numpy as np
 from coupled.errors import InputError
 from coupled.flight.conditions import Conditions, build_conditions, condition_wrappers
 from coupled.flight.event import trim_moved
+from coupled.flight.levers import Levers
 from coupled.flight.wrapper import Wrapper
 from coupled.gap.signals.output import Floats
 from coupled.record.channels import ControlName
+from coupled.record.levers import levers_of
 from coupled.record.record import Record
 
 FILE = "the manifest"
@@ -48,13 +52,20 @@ def reach_of(record: Record, control: ControlName) -> float:
 
 
 def wrappers_of(record: Record, frame_s: float) -> list[Wrapper]:
-    """Return the conditions of a record, and its first heading, as wrappers of an aircraft."""
+    """Return the conditions of a record as wrappers of an aircraft.
+
+    Those of a log of another program are its first heading, and the levers that move.
+    """
     seed = record.manifest.get("seed")
     drawn = seed if isinstance(seed, int) else 0
     acting = condition_wrappers(conditions_of(record), FILE, frame_s, drawn)
-    if "conditions" not in record.manifest and HEADING in record:
-        acting = [*acting, Headed(float(record[HEADING][0]))]
-    return acting
+    if "conditions" in record.manifest:
+        return acting
+    if HEADING in record:
+        acting.append(Headed(float(record[HEADING][0])))
+    moved = {name: record[name] for name in levers_of(record.channels) if np.ptp(record[name]) > 0}
+    rate_Hz = (len(record) - 1) / float(record.time_s[-1] - record.time_s[0])
+    return [*acting, Levers(moved, frame_s * rate_Hz)] if moved else acting
 
 
 class Headed(Wrapper):

@@ -37,6 +37,7 @@ from coupled.gap.signals.conditions import trim_shift, wrappers_of
 from coupled.gap.signals.output import Floats, estimate_noise
 from coupled.gap.thresholds import LOST_MOTION, NEGLIGIBLE, SAME_TRIM_rad, SHORTEST_RECORD_s
 from coupled.record.channels import ControlName, motion_channels
+from coupled.record.levers import levers_of
 from coupled.record.record import Record
 from coupled.resources import aircraft_folder
 from coupled.rig.parameters import Flight
@@ -149,11 +150,11 @@ def fly_open_loop(
     elif manner.coarse:
         wide = 2
         frame_s, air = wide * frame_s, air.in_pairs()
-    conditions = [] if record is None else wrappers_of(record, frame_s)
     if manner.between_rows != "held" and per_frame > 1:
         steps, per_frame = per_frame, 1
         frame_s /= steps
         air = air.repeated(steps)
+    conditions = [] if record is None else wrappers_of(record, frame_s)
     still = changed(flight, {**STILL, "steps_per_frame": per_frame}, "rig", "flight")
     gusts = Gusts(still, frame_s, air=air)
     models = [aircraft_folder()]
@@ -310,13 +311,10 @@ def lacking(record: Record) -> tuple[str, ...]:
 
 
 def is_throttled(record: Record) -> bool:
-    """Tell whether a throttle moves in a record; that of the model stays as in trim."""
-    return any(float(np.ptp(record[name])) > NEGLIGIBLE for name in throttles_of(record))
-
-
-def throttles_of(record: Record) -> list[str]:
-    """Return the channels of a record's throttles, which are a user's own."""
-    return [name for name in record.channels if "throttle" in name]
+    """Tell whether a throttle moves in a record, and is none of `levers_of`, so not the model's."""
+    levers = levers_of(record.channels)
+    own = [name for name in record.channels if "throttle" in name and name not in levers]
+    return any(float(np.ptp(record[name])) > NEGLIGIBLE for name in own)
 
 
 def not_judged(records: Sequence[Record]) -> str:
@@ -324,7 +322,7 @@ def not_judged(records: Sequence[Record]) -> str:
     if all(map(is_throttled, records)):
         return (
             "The throttle moves, and the model's stays as in trim: speed and attitude, which show "
-            "drag and thrust, cannot be judged."
+            "drag and thrust, cannot be judged. Name its channel throttle_norm, from 0 to 1."
         )
     each = [lacking(record) for record in records]
     if not all(each):

@@ -11,6 +11,7 @@ programs of its users the pitch rate), and positions of controls (shares of an u
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,6 +22,7 @@ from coupled.errors import InputError
 from coupled.files import open_file
 from coupled.record.importing.mapping import CHANNELS, Channel, Clock, Layout, LogMap
 from coupled.record.importing.reading import format_of
+from coupled.record.levers import lever_channel
 
 LOOKED_AT_bytes = 2**17  # of a file, which contain its head
 ANGLES = ("pitch_rad", "alpha_rad")
@@ -97,6 +99,20 @@ _XPLANE = {
     "pitch,__deg": ("pitch_rad", "deg"),
     "hding,_true": ("heading_rad", "deg"),
 }
+# A lever's column, with JSBSim's property. FlightGear writes no number of its first engine.
+_ENGINE = r"/controls/engines/engine(\[\d+\])?/"
+_LEVERS = [
+    (re.compile(pattern), jsbsim)
+    for pattern, jsbsim in (
+        (rf"{_TREE}(.+)", r"\1"),
+        (r"Flap Command \(norm\)", "fcs/flap-cmd-norm"),
+        (r"/controls/flight/flaps", "fcs/flap-cmd-norm"),
+        (r"/controls/flight/speedbrake", "fcs/speedbrake-cmd-norm"),
+        (r"/controls/flight/spoilers", "fcs/spoiler-cmd-norm"),
+        (rf"{_ENGINE}(throttle|mixture)", r"fcs/\2-cmd-norm\1"),
+        (rf"{_ENGINE}propeller-pitch", r"fcs/advance-cmd-norm\1"),
+    )
+]
 XPLANE_TIMES = ("_totl,_time", "missn,_time", "_real,_time")
 
 
@@ -124,15 +140,17 @@ def known_map(path: Path) -> tuple[str, LogMap]:
         problem = "its head is not JSBSim's, FlightGear's or X-Plane's: give --map, or --suggest"
         raise InputError(path, "", f"{problem} to have one proposed")
     head, names = found
-    channels: dict[str, Channel] = {}
-    for name in names:
+    channels, levers = dict[str, Channel](), dict[str, Channel]()
+    for name in sorted(names, key=lambda one: "-pos-" in one):  # a command before a position
         channel, unit = head.known.get(name, ("", ""))
         if channel and names.count(name) == 1:
             channels.setdefault(channel, Channel(source=name, unit=unit))
+        elif (lever := _lever(name)) and names.count(name) == 1:
+            levers.setdefault(lever, Channel(source=name, own=True))
     if not channels:
         problem = f"{head.program} wrote it, but none of a record's motions under its own name"
         raise InputError(path, "", f"{problem}: give --map")
-    ordered = {name: channels[name] for name in CHANNELS if name in channels}
+    ordered = {name: channels[name] for name in CHANNELS if name in channels} | levers
     layout = Layout(format="csv", delimiter=head.delimiter)
     angles = [names.index(channels[name].source) for name in ANGLES if name in channels]
     jsbsim = head.program == "JSBSim"
@@ -157,6 +175,14 @@ def _trimmed_from(text: str, delimiter: str, columns: Sequence[int]) -> float:
     first, *later = np.abs(np.diff(rows[:, list(columns)], axis=0))
     jumps = first > np.maximum(JUMPS * np.max(later, axis=0), LEAST_JUMP_rad)
     return float(rows[1, 0] - rows[0, 0]) if jumps.any() else 0.0
+
+
+def _lever(name: str) -> str:
+    """Return the channel of a lever's column (`levers`); "" for another column."""
+    for program, jsbsim in _LEVERS:
+        if (found := program.fullmatch(name)) is not None:
+            return lever_channel(found.expand(jsbsim).replace("[0]", ""))
+    return ""
 
 
 def _head(line: str) -> tuple[_Head, list[str]] | None:

@@ -99,8 +99,10 @@ def test_flightgears_log_has_seconds_and_property_paths(tmp_path: Path) -> None:
     time = 12.5 + np.arange(120) / 60.0
     theta = 3.0 * np.sin(time)
     head = "Time,/orientation/pitch-deg,/orientation/q-body,/fdm/jsbsim/aero/qbar-psf,Rudder"
+    head += ",/controls/engines/engine/throttle,/controls/engines/engine[1]/throttle"
+    head += ",/fdm/jsbsim/fcs/flap-pos-norm,/controls/flight/flaps"
     rows = [
-        f"{t:.6g},{p:.6f},{3 * DEG * np.cos(t):.8f},21.5,0"
+        f"{t:.6g},{p:.6f},{3 * DEG * np.cos(t):.8f},21.5,0,0.7,0.6,0.1,0.2"
         for t, p in zip(time, theta, strict=True)
     ]
     (tmp_path / "fg_log.csv").write_text("\n".join([head, *rows]) + "\n")
@@ -108,7 +110,9 @@ def test_flightgears_log_has_seconds_and_property_paths(tmp_path: Path) -> None:
     np.testing.assert_allclose(record["pitch_rad"], theta * DEG, atol=1e-7)
     np.testing.assert_allclose(record["pitch_rate_rad_per_s"], 3 * DEG * np.cos(time), atol=1e-7)
     np.testing.assert_allclose(record["dynamic_pressure_Pa"], 21.5 * 47.88025898)
-    assert account.unmapped == ("Rudder",)
+    assert account.unmapped == ("Rudder", "/fdm/jsbsim/fcs/flap-pos-norm")
+    levers = {"throttle_norm": 0.7, "throttle_1_norm": 0.6, "flap_norm": 0.2}
+    assert {name: float(record[name][0]) for name in levers} == levers
 
 
 def xplane(rows: int = 100) -> str:
