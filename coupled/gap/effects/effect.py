@@ -218,7 +218,6 @@ class Effect:
     `dry`          it is dry friction, whose presliding parameters are nuisance parameters
     `sampled`      its sampling error, if it is a random process
     `seen`         returns start values by parameter, estimated from the residuals
-    `of_sensor`    it acts in the sensor of δc, which a set point does not have
     `contains`     names of the laws nested in it
     `changes`      how many quantities of the rig change with its parameter
     `of`           the aerodynamic function that it scales; empty for an effect of the library
@@ -233,7 +232,6 @@ class Effect:
     dry: bool = False
     sampled: Sampled | None = None
     seen: Callable[[Sequence[Output], Rig, ControlName], list[dict[str, float]]] | None = None
-    of_sensor: bool = False
     contains: tuple[str, ...] = ()
     changes: int = 1
     of: str = ""
@@ -247,6 +245,11 @@ class Effect:
     def shows_in(self) -> tuple[str, ...]:
         """The outputs in which it shows."""
         return self.outputs or STAGE_OF[self.stage].effects_show_in
+
+    @property
+    def of_sensor(self) -> bool:
+        """Whether it acts in the sensor of δc, which a set point does not have."""
+        return self.stage == "sensing" and "multiplier" in self.shows_in
 
     @property
     def flies(self) -> bool:

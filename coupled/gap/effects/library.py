@@ -55,7 +55,6 @@ EFFECTS: tuple[Effect, ...] = (
     entry(
         *("sensing", "deflection_scale", ("computed", "computed_left")),
         factor("sensing.deflection_scale", 1.03),
-        of_sensor=True,
     ),
     entry(
         *("sensing", "force_scale", ("force", "missing")),
@@ -75,7 +74,6 @@ EFFECTS: tuple[Effect, ...] = (
     entry(
         *("sensing", "scale_drift", ("computed", "computed_left", "loop", WHOLE_s)),
         added("per_s", "sensing.scale_drift_per_s", -0.05, 0.05, 1e-3),
-        of_sensor=True,
     ),
     entry(
         *("sensing", "mains_hum", ("", "computed_left", "time", 0.2)),
@@ -89,7 +87,6 @@ EFFECTS: tuple[Effect, ...] = (
         ),
         value("phase_rad", "sensing.hum_phase_rad", -7, 7, 1.0, role="other", model_error=EXACT),
         seen=hums,
-        of_sensor=True,
     ),
     entry(
         *("sensing", STAMP, ("speed", "missing")),

@@ -363,7 +363,7 @@ def _fit_neighbours(beam: Beam, fitted: Fit, library: Sequence[Effect], wanted: 
             still = beam.screen.still_worth(fitted, some, beam.worth(found, MOST))
         dry = next((one for one in still if one.effect.dry), None)
         if dry is not None and not beam.contact:
-            first = _fit_sets(beam, _starts_with_one_more(beam, fitted, [dry]))
+            first = _fit_sets(beam, _starts_with_one_more(beam, fitted, [dry])[:1])
             beam.contact = _contact_values(beam, first[0]) if first else {}
         ends += _fit_sets(beam, _starts_with_one_more(beam, fitted, still))
     if beam.best and not beam.open_outputs(beam.best):

@@ -194,7 +194,7 @@ class Screen:
     def _screened(
         self, current: Fit, effect: Effect, counts: Floats, refitted: bool = False
     ) -> Screened:
-        """Return a candidate with the best start of each shape.
+        """Return a candidate with the best start of each shape, that of least residual first.
 
         `refitted`: the parameters of the current effects change with it, and its gain is that of
         its effective samples without it and them.
@@ -224,7 +224,7 @@ class Screen:
             times = min(max(-share, -1.0), 1.0) if effect.flies else 1.0
             if shape not in starts or left < starts[shape][0]:
                 starts[shape] = left, _times(self.problem, effect, values, times)
-        found = [values for _, values in starts.values()]
+        found = [values for _, values in sorted(starts.values(), key=lambda one: one[0])]
         return Screened(effect, found, taken, gain, refitted)
 
     def _signatures(self, current: Fit, effect: Effect) -> list[_Signature]:
