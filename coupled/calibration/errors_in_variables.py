@@ -97,10 +97,12 @@ def errors_in_variables(readings: Readings, instruments: Instruments) -> JointFi
 
 
 def _settled(figures: Floats, columns: Floats) -> Floats:
-    """Return the step sizes at which the fit has converged; a c may truly be zero."""
+    """Return the step sizes at which the fit has converged; b and c may truly be zero."""
     least = 1e-12 * np.abs(figures)
     size = np.max(np.abs(columns), axis=0, initial=1e-300)
-    least[3:] = np.maximum(least[3:], 1e-12 * abs(figures[0]) * size[0] / size[2:])
+    own = 1e-12 * abs(figures[0]) * size[0] / size[1:]
+    least[1] = max(least[1], own[0])
+    least[3:] = np.maximum(least[3:], own[1:])
     return np.asarray(least)
 
 
