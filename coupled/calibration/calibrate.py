@@ -15,7 +15,7 @@ from coupled.calibration.assumedscales import stale
 from coupled.calibration.errors_in_variables import errors_in_variables
 from coupled.calibration.estimate import Instruments, usual_instruments
 from coupled.calibration.fit import condition, normal_equations, ordinary
-from coupled.calibration.readingchecks import find_unit_doubts, refuse_poor
+from coupled.calibration.readingchecks import find_unit_doubts, find_zeros, refuse_poor
 from coupled.calibration.readings import Readings
 from coupled.calibration.readingsfile import read_readings
 from coupled.calibration.result import CalibrationResult
@@ -96,6 +96,7 @@ def calibrate_control(
             rows = ", ".join(str(suspect.row) for suspect in suspects)
             problem = f"without the outliers in rows {rows}: {error.problem}"
             raise InputError(file, error.key, problem) from None
+    zeros = find_zeros(used, file)
     d, f = used.deflection, used.force
     plain = ordinary(used, instruments)
     if plain.s1.value <= 0.0:
@@ -135,7 +136,7 @@ def calibrate_control(
         level,
         angles,
         tuple(stale(control)),
-        tuple(find_unit_doubts(used, control, name)),
+        (*find_unit_doubts(used, control, name), *zeros),
     )
 
 

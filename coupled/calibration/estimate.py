@@ -28,7 +28,11 @@ class Estimate:
     @property
     def half_width(self) -> float:
         """Half of the 95 % interval, by Student's t."""
-        return float(stdtrit(self.freedom, 0.5 + 0.5 * COVERAGE)) * self.error
+        return self.half_width_at(COVERAGE)
+
+    def half_width_at(self, confidence: float) -> float:
+        """Half of the interval of a confidence, by Student's t."""
+        return float(stdtrit(self.freedom, 0.5 + 0.5 * confidence)) * self.error
 
     @property
     def low(self) -> float:

@@ -112,7 +112,7 @@ def remarks(found: CalibrationResult, system: System = "si") -> list[str]:
         )
     lines += _creep_lines(found, system) + _accuracy_lines(found, system) + _arc_lines(found)
     lines += [f"stale calibration in the rig file: {change}" for change in found.changed]
-    lines += [f"doubtful unit: {doubt}" for doubt in found.doubts]
+    lines += [f"doubtful: {doubt}" for doubt in found.doubts]
     return lines
 
 

@@ -5,21 +5,26 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import chdtri
 
-from coupled.calibration.estimate import Instruments
+from coupled.calibration.errors_in_variables import FINEST
+from coupled.calibration.estimate import Estimate, Instruments
+from coupled.calibration.fit import solve
 from coupled.calibration.readings import Readings
+from coupled.calibration.sandwich import sandwich
 from coupled.errors import InputError
 from coupled.record.channels import unit_of
 from coupled.record.importing.plausible import unit_doubt
 from coupled.rig.parameters import Control
 
+Floats = NDArray[np.float64]
 FEWEST = 4  # readings: two unknowns, and degrees of freedom for their errors
 FEWEST_CROSSED = 2  # readings with a force on another control
 INSEPARABLE = 1e3  # condition number of δ, F and the forces on others, each scaled
 FAR = 0.1  # of the largest; a smaller deflection may have any sign
 BEYOND_TRAVEL = 1.5  # of the travel; a larger deflection is in a wrong unit
-SURELY = 0.999  # confidence that the gradients differ
+SURELY = 0.999  # confidence that the gradients differ, and that a zero is off
 
 
 def refuse_poor(
@@ -127,6 +132,41 @@ def find_unit_doubts(readings: Readings, control: Control, name: str) -> list[st
     span = f"{ends[0]:.4g} to {ends[1]:.4g} N/{unit_of(name)}"
     problem = f"F/deflection is {span}, the rig's gradients {np.min(filed):.4g}"
     return [f"{problem} to {np.max(filed):.4g}: the force {doubt}"]
+
+
+def find_zeros(readings: Readings, file: Path | str) -> list[str]:
+    """Return a doubt for v1 and v3 if they are not 0 at zero deflection and force.
+
+    The equations have no constant, so that a zero error of an instrument makes S1, K and S3 wrong.
+    Raises InputError for one that is a large share of the signal.
+    """
+    own = np.column_stack((readings.deflection, readings.force, readings.others))
+    signals = [("v1", own, readings.v1)]
+    if readings.gauge:
+        signals.append(("v3", readings.force[:, None], readings.v3))
+    doubts = []
+    for name, columns, signal in signals:
+        zero, most = _zero(columns, signal), float(np.max(np.abs(signal)))
+        if zero is None or abs(zero.value) <= max(zero.half_width_at(SURELY), FINEST * most):
+            continue
+        unit = readings.signal
+        said = f"is {zero.value:.4g} {unit} at zero deflection and force (line through the readings"
+        said += f", std. error {zero.error:.2g})"
+        if abs(zero.value) > FAR * most:
+            raise InputError(file, f"{name}_{unit}", f"{said}; subtract it from each reading")
+        doubts.append(f"{name} {said}: correct the zero of the meter, ruler or scale")
+    return doubts
+
+
+def _zero(columns: Floats, signal: Floats) -> Estimate | None:
+    """Return the constant of a line through the readings; None if they do not determine it."""
+    design = np.column_stack((np.ones(len(signal)), columns))
+    size = np.linalg.norm(design, axis=0)
+    if len(signal) <= len(size) or np.linalg.cond(design / size) > INSEPARABLE:
+        return None
+    found = solve(design, signal)
+    errors = sandwich(design[:, None, :], (signal - design @ found)[:, None])
+    return errors.estimate(float(found[0]), np.eye(len(found))[0])
 
 
 def _separating(control: Control, slope: float, strongest: float, d: str) -> str:

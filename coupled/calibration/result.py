@@ -29,7 +29,8 @@ class CalibrationResult(Result):
     normal equations. `s3_mean` is eq. (13), `s2` has each method for S₂. `accuracy` are the errors
     of deflection and felt gradient, None if no compensation exists. `one_sided`: nulls from one
     side only, on a control with friction. `readings` are those used, along the arc; `level` are the
-    level readings if they were corrected, else None. `doubts` are about the units of the readings.
+    level readings if they were corrected, else None. `doubts` are about the units and zeros of the
+    readings.
     """
 
     control: str

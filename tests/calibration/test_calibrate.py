@@ -12,6 +12,7 @@ import pytest
 from coupled.calibration.assumedscales import assumed_scales, real_scales, stale
 from coupled.calibration.calibrate import calibrate_control
 from coupled.calibration.calibrated import with_calibration
+from coupled.calibration.errors_in_variables import errors_in_variables
 from coupled.calibration.estimate import perfect_instruments, usual_instruments
 from coupled.calibration.figures import remarks
 from coupled.calibration.readings import Readings
@@ -64,8 +65,36 @@ def test_readings_in_another_unit_are_doubtful(length: float, force: float, said
     delta, pull = grid()
     v1 = S1 * (delta - K * pull)
     found = fit(readings(length * delta, force * pull, v1, S3 * pull))
-    remark = " ".join(line for line in remarks(found) if line.startswith("doubtful unit"))
+    remark = " ".join(line for line in remarks(found) if line.startswith("doubtful"))
     assert said in remark if said else not remark
+
+
+@pytest.mark.parametrize("signal", ["v1", "v3"])
+def test_a_zero_error_of_a_meter_is_refused_or_doubtful(signal: str) -> None:
+    """A converter's mid-scale in v1 gave K six times too large, with a narrow interval."""
+    good = with_errors(*grid(), USUAL, np.random.default_rng(14))
+    assert fit(good).doubts == ()
+    read = getattr(good, signal)
+    most = float(np.max(np.abs(read)))
+    [doubt] = fit(replace(good, **{signal: read + 0.05 * most})).doubts
+    assert doubt.startswith(f"{signal} is ") and "correct the zero" in doubt
+    with pytest.raises(InputError, match=f"{signal}_V: is .* subtract it from each reading"):
+        fit(replace(good, **{signal: read + 2.6 * most}))
+
+
+def test_error_free_readings_have_no_zero_error() -> None:
+    delta, pull = grid()
+    found = fit(readings(delta, pull, S1 * (delta - K * pull), S3 * pull))
+    assert found.doubts == ()
+
+
+def test_readings_of_a_rigid_structure_converge() -> None:
+    """The fit compared the step of b = -K*S1 with b itself, which is nearly 0."""
+    made = with_errors(*grid(), USUAL, np.random.default_rng(15))
+    for _ in range(8):
+        line = errors_in_variables(made, USUAL).line
+        made = replace(made, v1=made.v1 + line.bend.value * line.s1.value * made.force)
+    assert line.bend.value == pytest.approx(0.0, abs=1e-6 * K)
 
 
 @pytest.mark.parametrize("labels", ["one", "several"])
