@@ -17,6 +17,7 @@ from coupled.gap.search.found import Choice, Fit, Found
 from coupled.gap.signals.output import Output
 from coupled.gap.thresholds import CERTAIN, UNDERSTATED
 from coupled.rig.rig import Rig
+from tests.support.pendulum import moved_rig
 from tests.support.rigs import bench
 
 NUMBER = ParameterEstimate("x", 1.0, 0.5, 1.5, "loader.x", "N", 0.0, 1.0, 0.5, 1.5, "", False)
@@ -40,6 +41,25 @@ def test_an_effect_has_a_size_where_an_interval_excludes_the_neutral_value(
     case, effect = Case(bench(), "column", []), BY_NAME[name]
     numbers = [replace(NUMBER, low=low, high=high) for low, high in intervals]
     assert has_size(effect, case, numbers) == sized
+
+
+@pytest.mark.parametrize(
+    ("name", "filed", "shape", "sized"),
+    [
+        ("gravity", {"gravity_N": 20.0}, [(0.08, 0.12)], True),
+        ("gravity", {"gravity_N": 20.0}, [(-0.02, 0.12)], False),
+        ("gravity", {}, [(0.08, 0.12)], False),
+        ("relaxation", {"relaxing_stiffness_N_per_rad": 90.0}, [(2.0, 4.0)], True),
+        ("presliding_friction", {"friction_N": 2.0}, [(1e3, 2e3), (0.4, 0.6)], False),
+    ],
+)
+def test_the_shape_of_a_filed_size_may_be_the_fault(
+    name: str, filed: dict[str, float], shape: list[tuple[float, float]], sized: bool
+) -> None:
+    """A filed weight at a wrong angle was unexplained, since the weight itself was right."""
+    rig = moved_rig().changed({f"controls.wheel.loader.{k}": v for k, v in filed.items()})
+    numbers = [replace(NUMBER, low=low, high=high) for low, high in [(-0.1, 0.1), *shape]]
+    assert has_size(BY_NAME[name], Case(rig, "wheel", []), numbers) == sized
 
 
 @pytest.mark.parametrize(

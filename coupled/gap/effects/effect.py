@@ -241,6 +241,14 @@ class Effect:
         """The parameters with a value to fit."""
         return tuple(p for p in self.parameters if p.mode != "switch")
 
+    def deviating(self, rig: Rig, control: ControlName) -> tuple[Parameter, ...]:
+        """Return the parameters of which one is not neutral if the effect is present.
+
+        Shapes are among them if the rig files the sizes: the angle of a filed weight may be wrong.
+        """
+        filed = all(p.nominal(rig, control) for p in self.free if p.has_neutral or p.is_limit)
+        return tuple(p for p in self.free if p.has_neutral or (filed and not p.is_limit))
+
     @property
     def shows_in(self) -> tuple[str, ...]:
         """The outputs in which it shows."""

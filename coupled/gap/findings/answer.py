@@ -167,8 +167,10 @@ def effects_of(
 
 def has_size(effect: Effect, case: Case, numbers: Sequence[ParameterEstimate]) -> bool:
     """Tell whether a value of an effect differs from its neutral value; a limit always does."""
-    sizes = [(p, one) for p, one in zip(effect.free, numbers, strict=True) if p.has_neutral]
-    for p, one in sizes:
+    sizes = effect.deviating(case.nominal, case.control)
+    for p, one in zip(effect.free, numbers, strict=True):
+        if p not in sizes:
+            continue
         none, low, high = p.neutral(case.nominal, case.control), one.low, one.high
         if p.is_limit or not (low is None or low <= none) or not (high is None or none <= high):
             return True

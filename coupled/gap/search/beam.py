@@ -236,7 +236,7 @@ def is_admissible(problem: Problem, fitted: Fit, needed: Names = frozenset()) ->
 
 def _excludes_neutral(case: Case, fitted: Fit, effect: Effect) -> bool:
     """Tell whether the 95 % interval of a value excludes the neutral value; true for a limit."""
-    sizes = [p for p in effect.free if p.has_neutral]
+    sizes = effect.deviating(case.nominal, case.control)
     for p in sizes:
         key, none = effect.value_key(p), p.neutral(case.nominal, case.control)
         if p.is_limit or not fitted.low[key] <= none <= fitted.high[key]:
