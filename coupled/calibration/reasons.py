@@ -31,14 +31,26 @@ def reasons(
         return []
     control, d = rig.controls[name], unit_of(name)
     sentences = _host_errors(control, in_system(f"{d}/N", system))
+    far = any(_is_force(check) and not _within_breakout(control, check) for check in failed)
+    unknown = far and not sentences
     if control.loader.bend > 0.0:
         sentences += _bend_effects(control, failed, in_system("N", system))
-    if not sentences:
-        sentences = [
-            "The rig file does not show the reason. docs/calibration.md has a table of faults by"
-            " failed check, and coupled diagnose finds them in a record."
+    if unknown or not sentences:
+        of_force = " of the force's error" if sentences else ""
+        sentences += [
+            f"The rig file does not show the reason{of_force}. docs/calibration.md has a table of"
+            " faults by failed check, and coupled diagnose finds them in a record."
         ]
     return sentences
+
+
+def _is_force(check: ControlCheck) -> bool:
+    return check.name.startswith(_FORCE)
+
+
+def _within_breakout(control: Control, check: ControlCheck) -> bool:
+    """Tell whether a loader that rests within its breakout may cause so large an error."""
+    return abs(check.measured - check.reference) <= control.loader.breakout
 
 
 def _host_errors(control: Control, bent: Shown) -> list[str]:
@@ -80,8 +92,8 @@ def _bend_effects(control: Control, failed: Sequence[ControlCheck], force: Shown
             " damping and lead scheduled by the gradient correct both: coupled document RIG"
             " --write NEW.toml."
         )
-    pushed = any(check.name.startswith(_FORCE) for check in failed)
-    if pushed and control.loader.breakout > 0.0:
+    near = any(_is_force(check) and _within_breakout(control, check) for check in failed)
+    if near and control.loader.breakout > 0.0:
         breakout = f"{force.written(control.loader.breakout)} {force.unit}"
         found.append(
             f"Force near neutral: within the breakout of {breakout} the loader"

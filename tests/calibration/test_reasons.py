@@ -56,3 +56,12 @@ def test_a_fault_that_the_file_does_not_say_is_left_to_a_diagnosis() -> None:
     rigid = {f"{COLUMN}.loader.bend_m_per_N": 0.0, f"{COLUMN}.compensation.bend_m_per_N": 0.0}
     rig = report_rig().changed({**rigid, f"{COLUMN}.loader.cubic_N_per_m3": 1e5})
     assert "coupled diagnose" in said(rig)
+
+
+def test_a_force_error_above_the_breakout_is_not_blamed_on_it() -> None:
+    """The bend within a breakout of 4 N was given as the reason of a force error of 100 N."""
+    loader = {"breakout_N": 4.0, "cubic_N_per_m3": 1e5}
+    rig = report_rig().changed({f"{COLUMN}.loader.{key}": value for key, value in loader.items()})
+    words = said(rig)
+    assert "within the breakout" not in words
+    assert "does not show the reason of the force's error" in words
