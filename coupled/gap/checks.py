@@ -26,7 +26,7 @@ from coupled.flight.altered import STILL
 from coupled.flight.everyframe import PROPERTIES
 from coupled.gap.signals.output import Floats, Output, estimate_noise
 from coupled.gap.signals.reading import PRESSURE
-from coupled.gap.stages.surfaces import start_of, surface_channel, surface_points
+from coupled.gap.stages.surfaces import start_of, states_trim, surface_channel, surface_points
 from coupled.gap.thresholds import (
     DOUBLED,
     FAR_SIGMAS,
@@ -431,8 +431,8 @@ def _manifest_trim(flight: Flight, record: Record, file: str) -> dict[str, Any] 
     if given.get("model") != flight.model:
         problem = f"is {given.get('model')!r} in the manifest, {flight.model!r} in the rig file"
         raise InputError(file, "flight.model", f"{problem}: another rig's file?")
-    if "imported_from" in record.manifest:
-        return None  # the rig that the log was compared with at its import; its trim was not flown
+    if not states_trim(record):
+        return None
     return {key: given[key] for key in TRIM_KEYS if key in given}
 
 

@@ -31,6 +31,7 @@ from coupled.gap.findings.where import lone_channel
 from coupled.gap.prepare import finely_stepped, prepare
 from coupled.gap.search.beam import search_sets
 from coupled.gap.search.histories import search
+from coupled.gap.signals.output import TRIM
 from coupled.gap.stages.airframe import airframe_outputs, unjudged_axes
 from coupled.gap.stages.openloop import is_throttled
 from coupled.record.channels import LATERAL, SURFACES
@@ -284,6 +285,20 @@ def test_a_fault_of_the_forces_is_not_judged_by_an_aircraft_alone(healthy: Recor
         np.column_stack([healthy.data, np.ones((len(healthy), 2))]),
     )
     assert motion_alone({"log": forced})["log"].channels == healthy.channels
+
+
+def test_a_stuck_elevator_is_no_gap_of_the_trim(healthy: Record) -> None:
+    """The model's trim has the error of the measured airspeed, however quiet the elevator is."""
+    data = healthy.data.copy()
+    speed, elevator = map(healthy.channels.index, ("true_airspeed_m_per_s", "elevator_rad"))
+    data[:, speed] += np.random.default_rng(6).normal(scale=0.1, size=len(data))
+    data[:, elevator] = data[0, elevator]
+    stuck = Record(healthy.channels, data)
+    rig = trimmed(alone(), {"log": stuck})[0]["log"]
+    outputs = {one.channel: one for one in airframe_outputs(rig, stuck)}
+    gaps = {name: float(np.std(one.residual(rig))) for name, one in outputs.items()}
+    assert abs(float(np.mean(outputs[TRIM].residual(rig)))) < 1.0
+    assert gaps["pitch_rate_rad_per_s"] > 10.0
 
 
 def test_a_throttle_that_moves_is_seen_by_an_aircraft_alone(healthy: Record) -> None:

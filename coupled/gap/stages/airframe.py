@@ -55,6 +55,7 @@ from coupled.gap.stages.surfaces import (
     moved,
     surface_channel,
     surface_points,
+    trim_by_speed,
     trim_of,
 )
 from coupled.gap.thresholds import FAR, KNOWN, ROUGH, SHOT_TRIES
@@ -461,12 +462,14 @@ def _known_motion(rig: Rig, record: Record) -> tuple[str, ...]:
 def _trim_output(model: Model, trim: Trim) -> Output:
     """Return the elevator position in trim as an output, with the noise of its channel.
 
-    The trim is measured over a part of the rows, so the noise floor is higher than the noise.
+    The trim is measured over a part of the rows, so the noise floor is higher than the noise. The
+    trim of the model has the error of the airspeed from which it is taken.
     """
     position, at = model.record[surface_channel("column")], flown_by(model.rig).index("column")
     noise = position - smoothed(position)
     noise *= white(position) / max(float(np.std(noise)), 1e-12)
-    floor = max(trim.error * math.sqrt(len(position)), 1e-9)
+    error = math.hypot(trim.error, trim_by_speed(model.rig, model.record, "column"))
+    floor = math.hypot(error * math.sqrt(len(position)), KNOWN)
 
     def predict(rig: Rig) -> Floats:
         made = model.flown(rig)

@@ -27,6 +27,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.polynomial import Polynomial
 
+from coupled.errors import InputError
 from coupled.flight.aircraft import make_aircraft
 from coupled.flight.airframe import JSBSimAirframe
 from coupled.flight.altered import STILL, UNALTERED
@@ -38,6 +39,7 @@ from coupled.gap.stages.openloop import Moved, Points, about, fly_open_loop
 from coupled.gap.thresholds import (
     KNOWN,
     MOST,
+    NEGLIGIBLE,
     PARTLY,
     RIVAL_GAIN,
     ROUNDS,
@@ -302,6 +304,35 @@ def trim_of(rig: Rig, record: Record, control: ControlName) -> Trim | None:
     flown = _followed(rig, record, control, Trim(own, own, 0.0, standing), Trim(there, there, 0.0))
     in_trim = evidence > RIVAL_GAIN if flown is None else evidence + flown > -RIVAL_GAIN
     return Trim(there, there, error) if in_trim else Trim(own, own, noise, standing)
+
+
+def trim_by_speed(rig: Rig, record: Record, control: ControlName) -> float:
+    """Return the standard error of a surface's trim by that of the measured airspeed, rad.
+
+    0 if the trim is not measured, but that of the manifest or of the rig file.
+    """
+    speed = "true_airspeed_m_per_s"
+    if speed not in record or states_trim(record) or rig.flight is None:
+        return 0.0
+    noise = estimate_noise(record[speed])
+    level = noise.rms * math.sqrt(noise.mean_variance)
+    start, error = start_of(record[speed][: max(2, round(BRIEF_s * rig.frame_rate))], level)
+    calibrated = rig.flight.calibrated_airspeed * (1.0 + NEGLIGIBLE)
+    try:
+        faster = own_trim(rig.changed({"flight.calibrated_airspeed_m_per_s": calibrated}), control)
+    except InputError:  # no trim there
+        return 0.0
+    return abs(faster - own_trim(rig, control)) / NEGLIGIBLE * error / start
+
+
+def states_trim(record: Record) -> bool:
+    """Tell whether a record's manifest states the trim that was flown.
+
+    The rig of an imported log is the one that the log was compared with.
+    """
+    table = record.manifest.get("rig")
+    flown = isinstance(table, Mapping) and isinstance(table.get("flight"), Mapping)
+    return flown and "imported_from" not in record.manifest
 
 
 def start_of(position: Floats, noise: float) -> tuple[float, float]:
