@@ -31,6 +31,7 @@ from coupled.gap.findings.beside import beside_closed_form
 from coupled.gap.findings.budget import StageBudget, floors_of, shrink, stage_budget
 from coupled.gap.findings.curves import find_curves
 from coupled.gap.findings.diagnosis import Diagnosis, PartDiagnosis, WholeDiagnosis
+from coupled.gap.findings.gear import by_other_gear
 from coupled.gap.findings.healthy import Baseline, beside_healthy
 from coupled.gap.findings.judge import Judge
 from coupled.gap.findings.result import EffectResult, StageResult, Verdict
@@ -247,13 +248,15 @@ def findings(prepared: Prepared, case: Case, choice: Choice) -> PartDiagnosis:
     change = None
     if baseline is not None:
         change = baseline.compared(prepared.records, prepared.case.outputs, part.own)
-    if other := {one.name for one in effects if prepared.is_otherwise(one)}:
+    gear = by_other_gear(case, choice, records) if verdict != "no_gap" else None
+    shares = {one.name: MOST for one in effects if prepared.is_otherwise(one)}
+    shares |= dict.fromkeys(gear.effects, gear.probability) if gear is not None else {}
+    if any(one.name in shares for one in effects):
         effects = tuple(
-            replace(one, probability=MOST * one.probability) if one.name in other else one
-            for one in effects
+            replace(one, probability=shares.get(one.name, 1.0) * one.probability) for one in effects
         )
         verdict = "ambiguous" if verdict in ("effect", "mostly") else verdict
-    lone, untried = "", ""
+    by_gear, lone, untried = "" if gear is None else gear.words, "", ""
     if verdict == "unexplained":
         lone = lone_channel(outputs, case.nominal)
     if verdict == "unexplained" and AIRFRAME in faulty and not lone:
@@ -284,7 +287,9 @@ def findings(prepared: Prepared, case: Case, choice: Choice) -> PartDiagnosis:
         change=change,
         trim=prepared.trim,
         filtered={name: one for each in filtered for name, one in each},
-        left_out=tuple(words for words in (*prepared.left_out, lone, unknown, untried) if words),
+        left_out=tuple(
+            words for words in (*prepared.left_out, by_gear, lone, unknown, untried) if words
+        ),
         inseparable=inseparable(fit, case.control),
         curved=curves,
     )
