@@ -35,6 +35,7 @@ from coupled.gap.findings.gear import by_other_gear
 from coupled.gap.findings.healthy import Baseline, beside_healthy
 from coupled.gap.findings.judge import Judge
 from coupled.gap.findings.result import EffectResult, StageResult, Verdict
+from coupled.gap.findings.surfaceunit import in_other_unit
 from coupled.gap.findings.where import lone_channel
 from coupled.gap.prepare import Prepared, prepare
 from coupled.gap.search.case import Case, Tell
@@ -249,7 +250,9 @@ def findings(prepared: Prepared, case: Case, choice: Choice) -> PartDiagnosis:
     if baseline is not None:
         change = baseline.compared(prepared.records, prepared.case.outputs, part.own)
     gear = by_other_gear(case, choice, records) if verdict != "no_gap" else None
+    units = in_other_unit(case.nominal, effects)
     shares = {one.name: MOST for one in effects if prepared.is_otherwise(one)}
+    shares |= dict.fromkeys(units, MOST)
     shares |= dict.fromkeys(gear.effects, gear.probability) if gear is not None else {}
     if any(one.name in shares for one in effects):
         effects = tuple(
@@ -288,7 +291,16 @@ def findings(prepared: Prepared, case: Case, choice: Choice) -> PartDiagnosis:
         trim=prepared.trim,
         filtered={name: one for each in filtered for name, one in each},
         left_out=tuple(
-            words for words in (*prepared.left_out, by_gear, lone, unknown, untried) if words
+            words
+            for words in (
+                *prepared.left_out,
+                by_gear,
+                *dict.fromkeys(units.values()),
+                lone,
+                unknown,
+                untried,
+            )
+            if words
         ),
         inseparable=inseparable(fit, case.control),
         curved=curves,

@@ -1,0 +1,56 @@
+"""A surface whose position is in another unit than rad acts like another effectiveness."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from coupled.gap.diagnose import diagnose
+from coupled.gap.findings.result import EffectResult, ParameterEstimate
+from coupled.gap.findings.surfaceunit import in_other_unit
+from coupled.record.importing.convert import import_log
+from coupled.record.record import Record
+from coupled.resources import shipped_rigs
+from coupled.rig.rig import Rig
+from coupled.rig.rigfile import read_rig
+from tests.support.ownlogs import flown
+
+
+def alone() -> Rig:
+    return read_rig(shipped_rigs()["c172p"]).changed({"controls": {}, "noise": {}})
+
+
+@pytest.mark.parametrize(
+    ("surface", "factor", "unit"),
+    [
+        ("rudder", 0.28, "shares of its travel (0.279 rad)"),  # of ±16°
+        ("aileron", 0.30, "shares of its travel (0.262 to 0.349 rad)"),  # of 15° and 20°
+        ("elevator", 0.44, "shares of its travel (0.401 to 0.489 rad)"),  # of 23° and 28°
+        ("rudder", 0.0028, "per cent of its travel (0.279 rad)"),
+        ("aileron", 0.0175, "degrees"),
+        ("elevator", 0.6, ""),
+        ("rudder", 1.4, ""),
+    ],
+)
+def test_a_factor_of_the_size_of_another_unit_is_doubted(
+    surface: str, factor: float, unit: str
+) -> None:
+    number = ParameterEstimate("factor", factor, 0.97 * factor, 1.03 * factor)
+    found = in_other_unit(alone(), [EffectResult(f"{surface}_effectiveness", "", 0.9, (number,))])
+    assert set(found) == ({f"{surface}_effectiveness", f"{surface}_zero"} if unit else set())
+    assert all(one.startswith(f"{surface}_rad may be in {unit} instead") for one in found.values())
+
+
+@pytest.mark.slow
+def test_an_aileron_in_shares_of_its_travel_is_no_certain_effectiveness(tmp_path: Path) -> None:
+    """It was an effectiveness of 0.30 with a probability of 0.89."""
+    log, _ = import_log(flown(tmp_path, {}, 12.0)[0])
+    data = log.data.copy()
+    data[:, log.channels.index("aileron_rad")] /= 0.3
+    found = diagnose(alone(), {"log": Record(log.channels, data)})
+    (effect,) = found.effects
+    assert effect.name == "aileron_effectiveness"
+    assert effect.probability < 0.6
+    assert found.verdict == "ambiguous"
+    assert "aileron_rad may be in shares of its travel" in found.summary
