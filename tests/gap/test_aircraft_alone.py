@@ -301,6 +301,14 @@ def test_a_stuck_elevator_is_no_gap_of_the_trim(healthy: Record) -> None:
     assert gaps["pitch_rate_rad_per_s"] > 10.0
 
 
+def test_a_vane_that_stands_still_is_named(healthy: Record) -> None:
+    data = healthy.data.copy()
+    data[:, healthy.channels.index("sideslip_rad")] = 0.0
+    stuck = Record(healthy.channels, data)
+    said = [unjudged_axes(airframe_outputs(alone(), one), [one]) for one in (healthy, stuck)]
+    assert said == [[], ["sideslip_rad never changes: it is not judged."]]
+
+
 def test_a_throttle_that_moves_is_seen_by_an_aircraft_alone(healthy: Record) -> None:
     """Its channel was left out, and so the speed judged by the throttle in trim."""
     throttle = 0.5 + 0.2 * (healthy.time_s > 5.0)

@@ -443,7 +443,18 @@ def unjudged_axes(outputs: Sequence[Output], records: Sequence[Record]) -> list[
             found.append(f"Without {', '.join(first)} the {axis} motion is not judged.")
         elif all(one is not None and one.much for one in floors):
             found.append(f"The {axis} motion hardly exceeds its noise, which may hide its gap.")
+        else:
+            still = [
+                name for name in needed if name not in surfaces and _never_moves(name, records)
+            ]
+            found += [f"{name} never changes: it is not judged." for name in still]
     return found
+
+
+def _never_moves(name: str, records: Sequence[Record]) -> bool:
+    """Tell whether a channel is in some of the records, and constant in each of them."""
+    given = [record[name] for record in records if name in record]
+    return bool(given) and all(np.ptp(values) == 0.0 for values in given)
 
 
 def _known_motion(rig: Rig, record: Record) -> tuple[str, ...]:
