@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.flight.wrapper import Aircraft, Hook, Wrapper
-from coupled.record.levers import OF_ENGINES, levers_of
+from coupled.record.levers import OF_ENGINES, lever_property, levers_of
 
 Floats = NDArray[np.float64]
 
@@ -50,10 +50,8 @@ class Levers(Wrapper):
 
     def _driven(self, aircraft: Aircraft, kind: str, engine: int) -> list[str]:
         """Return the model's properties that a recorded lever moves."""
-        name = f"{'gear' if kind == 'gear' else 'fcs'}/{kind}-cmd-norm"
         alone = [each for each, _ in self._levers.values()].count(kind) == 1
         if kind in OF_ENGINES and alone:
-            each = (f"{name}[{i}]" if i else name for i in count())
-            return [*takewhile(aircraft.has, each)]
-        own = f"{name}[{engine}]" if engine else name
+            return [*takewhile(aircraft.has, (lever_property(kind, i) for i in count()))]
+        own = lever_property(kind, engine)
         return [own] if aircraft.has(own) else []

@@ -60,7 +60,7 @@ from coupled.record.importing import plausible
 from coupled.record.importing.account import log_rate_of
 from coupled.record.importing.redundant import force_unit, other_units, rate_ratio, reversed_rates
 from coupled.record.importing.suggest.sizes import RATES_Hz
-from coupled.record.levers import levers_of
+from coupled.record.levers import OF_ENGINES, lever_property, levers_of
 from coupled.record.record import Record
 from coupled.record.samples import FINER, check_samples, sampling_rate_of
 from coupled.resources import aircraft_folder
@@ -415,7 +415,11 @@ def _same(flight: Flight, key: str, value: Any) -> bool:
 def _change(flight: Flight, key: str, value: Any) -> str:
     """Return a text of the change of a key."""
     if key == "properties":
-        return "properties of the model"
+        old = flight.properties
+        new = {name: each for name, each in value.items() if each != old.get(name)}
+        return ", ".join(
+            f"{n} {old[n]:g} → {x:g}" if n in old else f"{n} {x:g}" for n, x in new.items()
+        )
     before = getattr(flight, _FIELDS[key])
     if isinstance(value, float):
         return f"{key} {before:.4g} → {value:.4g}"
@@ -445,6 +449,8 @@ def _measured_trim(rig: Rig, record: Record, file: str) -> dict[str, Any]:
         return {}
     flight, found = rig.flight, dict[str, Any]()
     rows = max(2, round(BRIEF_s * rig.frame_rate))
+    if configured := _configuration(rig, record, rows):
+        found["properties"] = flight.properties | configured
 
     def off(values: Floats, filed: float, least: float = 0.0) -> float | None:
         noise = estimate_noise(values)
@@ -477,6 +483,27 @@ def _measured_trim(rig: Rig, record: Record, file: str) -> dict[str, Any]:
         filed = f"the rig file has it at {trim_speed(rig):.4g}: another rig's file?"
         raise InputError(file, SPEED, f"{problem} {filed}") from None
     return found
+
+
+def _configuration(rig: Rig, record: Record, rows: int) -> dict[str, float]:
+    """Return the positions of flaps, gear and the like in the first rows, if not those of the rig.
+
+    By the model's properties, of those that the model has.
+    """
+    assert rig.flight is not None
+    levers = {name: kind for name, (kind, _) in levers_of(record.channels).items()}
+    shown = {name: lever_property(kind) for name, kind in levers.items() if kind not in OF_ENGINES}
+    if not shown:
+        return {}
+    still, folders = changed(rig.flight, STILL, "rig", "flight"), [aircraft_folder()]
+    plain = make_aircraft(still, 1.0 / rig.frame_rate, ["column"], folders)
+    filed = {own: plain.lever(own).read() for own in shown.values() if plain.has(own)}
+    measured = {own: float(np.median(record[name][:rows])) for name, own in shown.items()}
+    return {
+        own: measured[own]
+        for own, value in filed.items()
+        if abs(measured[own] - value) > NEGLIGIBLE
+    }
 
 
 def _climbs(record: Record, angle: float) -> bool:

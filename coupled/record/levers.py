@@ -29,3 +29,9 @@ def levers_of(channels: Iterable[str]) -> dict[str, tuple[str, int]]:
         if match is not None:
             found.setdefault((match[1], int(match[2] or 0)), name)
     return {name: lever for lever, name in found.items()}
+
+
+def lever_property(kind: str, engine: int = 0) -> str:
+    """Return the model's property that commands a lever."""
+    name = f"{'gear' if kind == 'gear' else 'fcs'}/{kind}-cmd-norm"
+    return f"{name}[{engine}]" if engine else name

@@ -11,6 +11,7 @@ import pytest
 from coupled.errors import InputError
 from coupled.flight.aircraft import make_aircraft
 from coupled.flight.levers import Levers
+from coupled.gap.checks import trimmed
 from coupled.gap.diagnose import diagnose
 from coupled.record.importing.convert import import_log
 from coupled.record.levers import lever_channel, levers_of
@@ -117,6 +118,18 @@ def test_a_lever_of_a_log_explains_the_motion_that_it_makes(
     still[:, record.channels.index(name)] = record[name][0]
     assert max(gaps(alone(), record, {}).values()) < 1.5
     assert max(gaps(alone(), Record(record.channels, still), {}).values()) > 5.0
+
+
+def test_flaps_that_a_log_begins_with_are_those_of_the_trim(tmp_path: Path) -> None:
+    flaps = "fcs/flap-cmd-norm"
+    made, _ = flown(tmp_path, {}, 8.0, properties=(*PROPERTIES, flaps), before={flaps: 0.33})
+    record = noisy(import_log(made)[0])
+    _, said = trimmed(alone(), {"log": record})
+    assert f"{flaps} 0.33" in said
+    assert max(gaps(alone(), record, {}).values()) < 1.2
+    without = [i for i, name in enumerate(record.channels) if name != "flap_norm"]
+    unknown = Record(tuple(record.channels[i] for i in without), record.data[:, without])
+    assert max(gaps(alone(), unknown, {}).values()) > 5.0
 
 
 def test_a_lever_in_percent_is_refused(tmp_path: Path) -> None:

@@ -90,13 +90,15 @@ def flown(
     by_hand: bool = True,
     fuel: float = 1.0,
     levers: Mapping[str, Callable[[float], float]] | None = None,
+    before: Mapping[str, float] | None = None,
 ) -> tuple[Path, Floats]:
     """Fly an edited copy of a model from trim in bare JSBSim, with its own CSV output.
 
     `factors` are on functions by the ends of their names, `controls` how many of elevator, aileron
     and rudder move, `by_hand` or in jumps, `fuel` in two tanks, of the model's. `levers` are
-    properties by what is added to their positions in trim at a time in s. Returns the CSV file, and
-    the properties at each frame, shape (frames, properties).
+    properties by what is added to their positions in trim at a time in s, `before` are properties
+    set before the trim. Returns the CSV file, and the properties at each frame, shape
+    (frames, properties).
     """
     models = edited_model(folder / "edited", model, multiplied(factors))
     listed = "".join(f"<property>{name}</property>" for name in properties)
@@ -110,6 +112,8 @@ def flown(
     fdm["ic/psi-true-deg"] = heading_deg
     for tank in (0, 1) if fuel != 1.0 else ():
         fdm[f"propulsion/tank[{tank}]/contents-lbs"] *= fuel
+    for name, value in (before or {}).items():
+        fdm[name] = value
     fdm["propulsion/set-running"] = -1
     fdm["fcs/mixture-cmd-norm"] = 1.0
     fdm.set_output_path(str(folder))
