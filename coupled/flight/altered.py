@@ -15,6 +15,8 @@ stays a moment, by whatever function the model uses, without side effects.
     pitch_stiffness          C_mα: the pitching moment due to the angle of attack; changes the trim
     pitching_moment          a constant C_m that is added; changes the trim
     lift_offset              a constant C_L that is added; changes the trim
+    yawing_moment            a constant C_n that is added; changes the trim
+    side_force               a constant C_Y that is added; changes the trim
     dihedral_effect          C_lβ: the rolling moment due to the sideslip
     directional_stability    C_nβ: the yawing moment due to the sideslip
     adverse_yaw              C_nδa: the yawing moment due to the ailerons
@@ -37,6 +39,7 @@ from coupled.flight.everyframe import TRIMS
 from coupled.flight.loading import INERTIAS
 from coupled.flight.modelparts import (
     FORCE,
+    LATERAL_MOMENT,
     MOMENT,
     Constant,
     NothingToScaleError,
@@ -88,6 +91,8 @@ ALTERATIONS = (
     Alteration(Thrust()),
     Alteration(Constant("pitching_moment", "PITCH", MOMENT)),
     Alteration(Constant("lift_offset", "LIFT", FORCE)),
+    Alteration(Constant("yawing_moment", "YAW", LATERAL_MOMENT)),
+    Alteration(Constant("side_force", "SIDE", FORCE)),
     Alteration(Scaled("lift_slope", "lift due to the angle of attack", _ALPHA, _LIFT)),
     Alteration(Scaled("side_force_slope", "side force due to the sideslip", _BETA, _SIDE)),
     Alteration(Scaled("pitch_damping", "pitching moment due to the pitch rate", _Q, _PITCH)),

@@ -29,6 +29,7 @@ from coupled.flight.modeltext import ModelText, axis_of, named_functions
 Element = ElementTree.Element
 FORCE = ("aero/qbar-psf", "metrics/Sw-sqft")  # q̄·S, lbf
 MOMENT = (*FORCE, "metrics/cbarw-ft")  # q̄·S·c̄, lbf·ft
+LATERAL_MOMENT = (*FORCE, "metrics/bw-ft")  # q̄·S·b, lbf·ft
 
 
 class NothingToScaleError(Exception):

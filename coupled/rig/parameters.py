@@ -444,6 +444,8 @@ class Flight(Section):
     adverse_yaw: float = quantity("", 1.0, ge=-10, le=10)
     pitching_moment: float = quantity("", 0.0, ge=-2, le=2)
     lift_offset: float = quantity("", 0.0, ge=-2, le=2)
+    yawing_moment: float = quantity("", 0.0, ge=-2, le=2)
+    side_force: float = quantity("", 0.0, ge=-2, le=2)
     lift_slope: float = quantity("", 1.0, ge=0, le=10)
     side_force_slope: float = quantity("", 1.0, ge=-10, le=10)
     drag: float = quantity("", 1.0, ge=0, le=10)

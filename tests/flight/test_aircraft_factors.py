@@ -55,6 +55,8 @@ OTHER = {
     **dict.fromkeys([*(a.part.name for a in ALTERATIONS), *INERTIAS, "mass"], 0.7),
     "pitching_moment": 0.01,
     "lift_offset": 0.01,
+    "yawing_moment": 0.001,
+    "side_force": 0.01,
     "cg_aft_m": 0.1,
     "gust_rms_m_per_s": 1.0,
     "lateral_gust_rms_m_per_s": 1.0,

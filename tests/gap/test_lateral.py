@@ -14,6 +14,7 @@ from coupled.record.record import Record
 from coupled.resources import aircraft_folder
 from coupled.rig.rig import Rig
 from coupled.rig.rigfile import read_rig
+from tests.support import threecontrols
 from tests.support.airframes import noisy
 from tests.support.threecontrols import pushes
 
@@ -39,6 +40,20 @@ def test_three_moving_controls_are_no_gap(cessna: Rig) -> None:
         gaps = [stage.gap for stage in found.stages if stage.gap is not None]
         assert len(gaps) == 6 and max(gaps) < 1.2
         assert found.stage("sensing").shown_in == ("loader", "linkage")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "value"), [("yawing_moment", 0.002), ("side_force", 0.02)])
+def test_an_aircraft_that_is_not_alike_on_both_sides_is_found(
+    cessna: Rig, name: str, value: float
+) -> None:
+    record = threecontrols.flown(cessna, {f"flight.{name}": value}, 30.0, pedals=160.0)
+    found = diagnose(cessna, {"r": record})
+    (effect,) = found.effects
+    (number,) = effect.parameters
+    assert (found.verdict, effect.name) == ("effect", name)
+    assert number.low is not None and number.high is not None
+    assert number.low < value < number.high
 
 
 @pytest.mark.parametrize(

@@ -43,6 +43,7 @@ from tests.support.rigs import bench
 CLP = "aero/coefficient/Clp"
 SIZES = {"center_of_gravity": 0.08, "mass": 1.1, "lift_slope": 0.9}
 SIZES |= {"pitching_moment": 0.01, "lift_offset": 0.05}
+SIZES |= {"yawing_moment": 0.002, "side_force": 0.02}
 
 
 @pytest.fixture(scope="module")
@@ -220,7 +221,7 @@ def test_effects_of_lateral_motion_are_tried_where_it_moves(cessna: Rig, worn: R
         return {effect.name for effect in tried_effects(every, readers, [output])}
 
     lateral = {effect.name for effect in AIRFRAME if effect.needs} - {"vertical_gust"}
-    assert len(lateral) == 11
+    assert len(lateral) == 13
     assert tried(motion) - tried(still) == {*lateral, f"term {CLP}"}
 
 

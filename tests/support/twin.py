@@ -23,6 +23,7 @@ WITHOUT_TWIN = {
     *("dihedral_effect", "directional_stability", "side_force_slope", "adverse_yaw", "drag"),
     *("thrust", "roll_inertia", "pitch_inertia", "yaw_inertia", "center_of_gravity"),
     *("lateral_gust", "pitching_moment", "lift_offset", "fuel"),
+    *("yawing_moment", "side_force"),
     *("elevator_zero", "alpha_zero", "sideslip_zero", "pitch_zero", "load_factor_zero"),
     *("pitch_rate_zero", "roll_rate_zero", "yaw_rate_zero"),
 }

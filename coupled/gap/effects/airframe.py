@@ -40,6 +40,12 @@ def _factor_on(
     return entry("airframe", name, (x, y, drawing, 4.0), number, needs=needs)
 
 
+def _constant(name: str, x: str, y: str, start: float, needs: tuple[str, ...] = ()) -> Effect:
+    """Return the effect of a constant coefficient of a force or moment."""
+    number = added("coefficient", f"flight.{name}", -1.0, 1.0, start)
+    return entry("airframe", name, (x, y, "loop", 4.0), number, needs=needs)
+
+
 def _gust(name: str, key: str, drawn: str, needs: tuple[str, ...]) -> Effect:
     """Return the effect of gusts, by the key of their rms."""
     number = value("rms_m_per_s", f"flight.{key}", 0, 30, 0.5)
@@ -73,14 +79,10 @@ AIRFRAME: tuple[Effect, ...] = (
         *("airframe", "center_of_gravity", ("alpha", "pitch_rate", "loop", 4.0)),
         added("aft_m", "flight.cg_aft_m", -2.0, 2.0, 0.02),
     ),
-    entry(
-        *("airframe", "pitching_moment", ("alpha", "pitch_rate", "loop", 4.0)),
-        added("coefficient", "flight.pitching_moment", -1.0, 1.0, 0.01),
-    ),
-    entry(
-        *("airframe", "lift_offset", ("alpha", "load_answer", "loop", 4.0)),
-        added("coefficient", "flight.lift_offset", -1.0, 1.0, 0.01),
-    ),
+    _constant("pitching_moment", "alpha", "pitch_rate", 0.01),
+    _constant("lift_offset", "alpha", "load_answer", 0.01),
+    _constant("yawing_moment", "rudder", "yaw_rate", 0.001, (_YAW,)),
+    _constant("side_force", "sideslip", "yaw_left", 0.01, (_SLIP,)),
     _gust("vertical_gust", "gust_rms_m_per_s", "air", NEEDS),
     _gust("lateral_gust", "lateral_gust_rms_m_per_s", "crossing_air", NEEDS_ACROSS),
 )
