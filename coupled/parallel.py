@@ -248,14 +248,22 @@ def limit_memory() -> None:
 def cores(workers: int) -> int:
     """Return the number of processes for a `workers` option: 0 means one per core.
 
-    Raises InputError for a negative number or more than `MOST_WORKERS`.
+    Cores are those that this process may use, or `PYTHON_CPU_COUNT` if it is set, which Python
+    obeys from 3.13 on. Raises InputError for a negative number or more than `MOST_WORKERS`.
     """
     if not 0 <= workers <= MOST_WORKERS:
         raise InputError(
             "workers", "", f"is {workers}; give 1 to {MOST_WORKERS}, or 0 for all cores"
         )
-    wanted = workers or os.cpu_count() or 1
+    wanted = workers or _usable_cores()
     return min(wanted, _MOST_ON_WINDOWS) if sys.platform == "win32" else wanted
+
+
+def _usable_cores() -> int:
+    given = os.environ.get("PYTHON_CPU_COUNT", "")
+    if given.isdecimal() and int(given) > 0:
+        return int(given)
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def main_is_guarded() -> bool:

@@ -14,8 +14,9 @@ settings.load_profile("coupled")
 
 WORKER = os.environ.get("PYTEST_XDIST_WORKER")
 if WORKER:
-    # A worker has one core: threads of linear algebra would fight for it.
+    # A worker has one core: threads of linear algebra, and processes beside it, would fight for it.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    os.environ.setdefault("PYTHON_CPU_COUNT", "1")
 
 MOST_WORKERS = 4
 

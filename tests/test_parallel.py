@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import importlib
+import os
 import threading
 import time
 
 import numpy as np
 import pytest
 
-from coupled.parallel import WorkCancelledError, go_on, in_threads, threads
+from coupled.parallel import WorkCancelledError, cores, go_on, in_threads, threads
 
 
 def test_several_threads_return_what_one_returns_in_the_same_order() -> None:
@@ -142,3 +143,23 @@ def test_linear_algebra_has_one_thread_within_and_its_own_again_after() -> None:
     with threads(2):
         assert set(counts()) == {1}
     assert counts() == before
+
+
+def test_the_number_of_cores_is_the_one_that_is_set(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PYTHON_CPU_COUNT", "3")
+    assert [cores(0), cores(2)] == [3, 2]
+
+
+@pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="the system limits no process")
+@pytest.mark.parametrize("given", ["", "default", "0"])
+def test_a_process_limited_to_one_core_uses_one(
+    monkeypatch: pytest.MonkeyPatch, given: str
+) -> None:
+    monkeypatch.setenv("PYTHON_CPU_COUNT", given)
+    before = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {min(before)})
+    try:
+        assert cores(0) == 1
+    finally:
+        os.sched_setaffinity(0, before)
+    assert cores(0) == len(before)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -145,10 +144,11 @@ def bench(
 def _repeat(made: CalibrationBench, repeat: int, seed: int, json_file: str) -> None:
     from coupled.calibration.coverage import measure_coverage
     from coupled.cli.tables import print_table
+    from coupled.parallel import cores
     from coupled.tables.calibration import coverage_table
 
     with progress() as advance:
-        workers = min(os.cpu_count() or 1, 8, -(-repeat // 50))
+        workers = min(cores(0), 8, -(-repeat // 50))
         coverage = measure_coverage(made, repeat, seed, workers, advance)
     if json_file != "-":
         print_table(out, coverage_table(coverage))
