@@ -267,10 +267,11 @@ class _Fit:
         self._pressures = np.unique(sweep.pressure)
         at = np.abs(sweep.deflection[used]) if odd else sweep.deflection[used]
         self._at, self._force = at, sweep.force[used]
-        pressure = sweep.pressure[used]
-        self._levels = [np.unique(at[pressure == q]) for q in self._pressures]
+        self._side = np.sign(sweep.deflection[used])
+        self._at_pressure = sweep.pressure[used, None] == self._pressures
+        self._levels = [np.unique(at[here]) for here in self._at_pressure.T]
         # F_BO and F_c, and F_0 as two of which one is 0
-        columns = [np.sign(sweep.deflection[used]), sweep.motion[used]]
+        columns = [self._side, sweep.motion[used]]
         columns += [np.ones_like(at), -np.ones_like(at)] if zero else []
         self._constant = np.stack(columns, axis=1)
         ends = [end for end in (float(np.min(at)), float(np.max(at))) if end < 0.0 or end > 0.0]
@@ -293,26 +294,23 @@ class _Fit:
 
         From two deflections a straight line is extended to neutral, where it gives the breakout.
         """
+        ends = np.array(nodes)
+        beside_neutral = (ends[:-1] == 0.0) | (ends[1:] == 0.0)
         for at in self._levels:
-            for low, high in pairwise(nodes):
-                inside = (at > low) & (at <= high) if low >= 0.0 else (at >= low) & (at < high)
-                if np.count_nonzero(inside) < (2 if 0.0 in (low, high) else 1):
-                    return False
+            below, up_to = (np.diff(np.searchsorted(at, ends, side)) for side in ("left", "right"))
+            inside = np.where(ends[:-1] >= 0.0, up_to, below)  # the outer end belongs to a segment
+            if np.any(inside < np.where(beside_neutral, 2, 1)):
+                return False
         return True
 
     def _design(self, nodes: Sequence[float]) -> Floats:
         """Return the derivatives of the readings by the constants, and each rise at each q̄."""
-        sweep, used = self._sweep, self._used
-        side = np.sign(sweep.deflection[used])
-        columns = list(self._constant.T)
-        zero = nodes.index(0.0)
-        for k, (low, high) in enumerate(pairwise(nodes)):
-            inside = np.clip((self._at - low) / (high - low), 0.0, 1.0)
-            share = inside if k >= zero else inside - 1.0
-            share = side * share if self._odd else share
-            for q in self._pressures:
-                columns.append(share * (sweep.pressure[used] == q))
-        return np.stack(columns, axis=1)
+        ends, before_neutral = np.array(nodes), np.arange(len(nodes) - 1) < nodes.index(0.0)
+        inside = (self._at[:, None] - ends[:-1]) / np.diff(ends)
+        share = np.clip(inside, 0.0, 1.0) - before_neutral
+        share = self._side[:, None] * share if self._odd else share
+        rises = share[:, :, None] * self._at_pressure[:, None, :]
+        return np.hstack((self._constant, rises.reshape(len(share), -1)))
 
     def _solve(self, nodes: Sequence[float]) -> tuple[Floats, Floats]:
         design = self._design(nodes)

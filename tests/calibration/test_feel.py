@@ -60,8 +60,13 @@ def fitted(path: Path) -> Feel:
     return fit_feel(read_sweep(path, "column"))
 
 
-def test_a_columns_breakout_friction_and_five_segments_are_recovered(tmp_path: Path) -> None:
-    found = fitted(column_sweep(tmp_path))
+@pytest.fixture(scope="module")
+def column(tmp_path_factory: pytest.TempPathFactory) -> Feel:
+    return fitted(column_sweep(tmp_path_factory.mktemp("column")))
+
+
+def test_a_columns_breakout_friction_and_five_segments_are_recovered(column: Feel) -> None:
+    found = column
     assert found.breakout_N == pytest.approx(BREAKOUT_N, abs=2.0 * found.breakout_half_width_N)
     assert found.friction_N == pytest.approx(FRICTION_N, abs=2.0 * found.friction_half_width_N)
     assert found.breakout_half_width_N < 0.6
@@ -75,10 +80,12 @@ def test_a_columns_breakout_friction_and_five_segments_are_recovered(tmp_path: P
         assert theirs == pytest.approx(ours, abs=1.0)
 
 
-def test_breakout_and_friction_that_depend_on_the_pressure_are_doubtful(tmp_path: Path) -> None:
+def test_breakout_and_friction_that_depend_on_the_pressure_are_doubtful(
+    tmp_path: Path, column: Feel
+) -> None:
     """Of 12 and 18 N at two pressures the breakout was 14.75 N ± 0.36 N, without a word."""
+    assert not len(column.by_pressure)
     path = column_sweep(tmp_path)
-    assert not len(fitted(path).by_pressure)
     head, *rows = path.read_text(encoding="utf-8").splitlines()
     lines = [head]
     for row in rows:
@@ -221,8 +228,8 @@ def test_a_gauge_that_saturates_is_doubtful(tmp_path: Path) -> None:
     assert "# Doubtful: column_force_N: clipped at 60" in (tmp_path / "cut.toml").read_text("utf-8")
 
 
-def test_forces_that_no_rising_curve_fits_are_doubtful(tmp_path: Path) -> None:
-    assert fitted(column_sweep(tmp_path)).doubts("column") == []
+def test_forces_that_no_rising_curve_fits_are_doubtful(tmp_path: Path, column: Feel) -> None:
+    assert column.doubts("column") == []
     at, _ = swept(-0.1, 0.1)
     rows = [f"{d:.5f},{50.0 * np.sin(30.0 * d):.3f}" for d in at]
     path = tmp_path / "waves.csv"
