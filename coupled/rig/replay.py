@@ -144,7 +144,7 @@ def replay_product(
     difference of the host's K̂ in ΔG from the rig's, d/N.
     """
     p, s = _one(rig, control)
-    none = np.zeros_like(computed)
+    computed, none = _contiguous(computed), np.zeros_like(computed)
     host = Hosted(missed=missed, assumed=assumed).rows(len(none))[3:]
     made = _product(p, s, computed, feel.rows(), np.stack(host), none)
     return held_over(made, missed) if p[0]["modification"]["digital"] else made
@@ -175,6 +175,7 @@ def drive_linkage(
     p, s = _one(rig, control)
     h = 1.0 / (rig.frame_rate * rig.substeps)
     s[0]["linkage"]["position"] = s[0]["linkage"]["grip"] = nodes[0]
+    nodes, force_N = _contiguous(nodes), _contiguous(force_N)
     bent = _by_others(rig, control, others_N or {}, 0, force_N)
     return _linkage(p, s, nodes, force_N, bent, rig.substeps, h, np.empty_like(force_N))
 
@@ -188,6 +189,7 @@ def bent_by(
     """
     p, s = _one(rig, control)
     p[0]["linkage"]["contact"] = 0.0
+    force_N = _contiguous(force_N)
     h = 1.0 / (rig.frame_rate * rig.substeps)
     bent = _by_others(rig, control, others_N or {}, 0, force_N)
     return _bent(p, s, force_N, bent, rig.substeps, h, np.empty_like(force_N))
@@ -206,6 +208,7 @@ def replay_compensation(
     It keeps its last value in the frames `missed` by the host.
     """
     p, _ = _one(rig, control)
+    computed, force_N = _contiguous(computed), _contiguous(force_N)
     made = _compensation(p, computed, force_N, np.empty_like(force_N))
     return held_over(made + _by_others(rig, control, others_N or {}, 1, force_N), missed)
 
@@ -226,7 +229,13 @@ def _by_others(
 def replay_surface(rig: Rig, control: str, estimated: Floats, pressure_Pa: Floats) -> Floats:
     """Return the command about trim, in ±1, over each frame, for δ̂ in d and q̄ in Pa."""
     p, s = _one(rig, control)
+    estimated, pressure_Pa = _contiguous(estimated), _contiguous(pressure_Pa)
     return _surface(p, s, estimated, pressure_Pa, np.empty_like(estimated))
+
+
+def _contiguous(signal: Floats) -> Floats:
+    """Return a signal in contiguous memory; for a column of a table kernels are compiled anew."""
+    return np.ascontiguousarray(signal, dtype=np.float64)
 
 
 def _one(rig: Rig, control: str) -> tuple[Any, Any]:

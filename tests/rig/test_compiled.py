@@ -13,9 +13,10 @@ from subprocess import PIPE
 import numpy as np
 import pytest
 from llvmlite import binding
+from numpy.typing import NDArray
 
 import coupled
-from coupled.rig import compiled
+from coupled.rig import compiled, replay
 from coupled.rig.compiled import (
     carray,
     compiled_before,
@@ -25,6 +26,11 @@ from coupled.rig.compiled import (
     pointer,
     shippable,
 )
+from coupled.rig.hosted import Feel
+from coupled.rig.nodes import on_nodes
+from tests.support.rigs import bench
+
+Floats = NDArray[np.float64]
 
 KERNEL = """
 from coupled.rig.compiled import entry
@@ -164,3 +170,31 @@ def test_code_that_comes_with_the_package_runs_where_it_can(
             assert compiled._shipped_file(scaled) is None
     (tmp_path / name).rename(tmp_path / name.replace("kernels-", "kernels-0"))
     assert compiled._shipped_file(scaled) is None
+
+
+def test_the_columns_of_a_table_take_the_kernels_of_contiguous_signals() -> None:
+    """Each layout of each signal was compiled and cached apart, which takes half a minute."""
+    rig, table = bench(), np.random.default_rng(1).normal(scale=0.01, size=(40, 2))
+
+    def replayed(one: Floats, other: Floats) -> Floats:
+        feel = Feel(np.full(len(one), 500.0))
+        return np.stack(
+            (
+                replay.replay_product(rig, "column", one, feel),
+                replay.replay_linkage(rig, "column", one, other),
+                replay.drive_linkage(rig, "column", on_nodes(rig, one), other),
+                replay.bent_by(rig, "column", other),
+                replay.replay_compensation(rig, "column", one, other),
+                replay.replay_surface(rig, "column", one, other),
+            )
+        )
+
+    def signatures() -> dict[str, int]:
+        kernels = vars(replay).items()
+        return {name: len(each.signatures) for name, each in kernels if hasattr(each, "signatures")}
+
+    wanted = replayed(*np.ascontiguousarray(table.T))
+    before = signatures()
+    assert {"_product", "_linkage", "_bent", "_compensation", "_surface"} <= set(before)
+    assert np.array_equal(replayed(*table.T), wanted)
+    assert signatures() == before
