@@ -37,6 +37,7 @@ LONG |= {"pitch_stiffness", "lift_slope", "mass", "inertia", "modifying_lag", "p
 LONG |= {"stiffening_bend", "cable_stretch", "surface_freeplay", "rigging_offset"}
 LONG |= {"surface_rate_limit", "servo_rate_limit", "pitch_damping"}
 LONG |= {"servo_lag", "deflection_zero", "pressure_scale", "bend"}
+LONG |= {"backlash"}  # `test_diagnose_on_the_command_line` and tests/test_front_door.py find one
 
 # Forty seconds meet few gusts. The noise of F walks a contact that yields, smoothed as it is.
 ROUGHLY = {
