@@ -69,11 +69,12 @@ def test_a_call_that_would_wait_is_done_beside_by_a_process_that_ends_with_the_w
     assert not alive(beside)
 
 
-def test_work_may_end_while_a_process_still_loads() -> None:
+@pytest.mark.parametrize("rounds", [1, pytest.param(4, marks=pytest.mark.slow)])
+def test_work_may_end_while_a_process_still_loads(rounds: int) -> None:
     """On a busy machine the thread that waited for it read from a closed pipe, now and then."""
     busy = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(4)]
     try:
-        for pause_s in 4 * (0.0, 0.03, 0.1, 0.3):
+        for pause_s in rounds * (0.0, 0.03, 0.1, 0.3):
             with threads(2):
                 places(where)
                 time.sleep(pause_s)

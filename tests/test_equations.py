@@ -87,10 +87,14 @@ def cited(text: str) -> Iterator[str]:
 
 @cache
 def functions(folder: str) -> tuple[tuple[Path, ast.FunctionDef], ...]:
+    """Return the functions of the files that name an equation."""
+    texts = {path: path.read_text(encoding="utf-8") for path in (ROOT / folder).rglob("*.py")}
+    named = (CITED, APPENDIX, NAMED)
     return tuple(
         (path.relative_to(ROOT), node)
-        for path in sorted((ROOT / folder).rglob("*.py"))
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        for path, text in sorted(texts.items())
+        if any(pattern.search(text) for pattern in named)
+        for node in ast.walk(ast.parse(text))
         if isinstance(node, ast.FunctionDef)
     )
 
