@@ -11,7 +11,6 @@ import pytest
 from coupled.authority.compare import fly_and_judge
 from coupled.calibration.documentation import document
 from coupled.calibration.estimate import Estimate
-from coupled.cli import main
 from coupled.flight.manoeuvre import Configuration
 from coupled.flight.runfile import read_run
 from coupled.plots.checks import draw_releases, draw_static_checks
@@ -252,23 +251,13 @@ HOSTILE = [
 
 
 @pytest.mark.parametrize(("words", "says"), HOSTILE, ids=[" ".join(w)[:40] for w, _ in HOSTILE])
-def test_wrong_arguments_are_refused_in_one_line(
-    folder: Path,
-    words: list[str],
-    says: str,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    monkeypatch.chdir(folder)
-    monkeypatch.setattr("sys.argv", ["coupled", *words])
-    with pytest.raises(SystemExit) as ended:
-        main()
-    printed = capsys.readouterr()
-    assert ended.value.code == 2, printed.out
-    assert printed.err.startswith("error: ")
-    assert printed.err.count("\n") == 1
-    assert says in printed.err
-    assert printed.out == ""
+def test_wrong_arguments_are_refused_in_one_line(folder: Path, words: list[str], says: str) -> None:
+    done = coupled(folder, *words)
+    assert done.returncode == 2, done.stdout
+    assert done.stderr.startswith("error: ")
+    assert done.stderr.count("\n") == 1
+    assert says in done.stderr
+    assert done.stdout == ""
     assert files(folder) == {"r.csv"}
 
 
