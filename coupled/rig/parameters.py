@@ -75,7 +75,7 @@ class Loader(Section):
     regressor_friction: float = quantity("N_per_unit", 0.0)
     bob_weight: float = quantity("N_per_g", 0.0)
     offset: float = quantity("N", 0.0)
-    cubic: float = quantity("N_per_{d}3", 0.0, ge=0)
+    cubic: float = quantity("N_per_{d}3", 0.0)
     ripple: float = quantity("N", 0.0)
     ripple_period: float = quantity("{d}", 0.01, gt=0)
     ripple_phase: float = quantity("rad", 0.0)

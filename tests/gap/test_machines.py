@@ -65,6 +65,17 @@ def test_a_hardening_spring_and_a_damping_are_found_under_a_broadband_force(to_H
     assert damping.verdict == spring.verdict == "effect"
 
 
+@pytest.mark.slow
+def test_a_softening_spring_is_found_under_a_broadband_force() -> None:
+    """It was "friction ripple with gradient error with breakout"."""
+    found = diagnose(duffing_rig(cubic=0.0), {"r": duffing(seed=2, cubic=SOFTENING)})
+    assert [effect.name for effect in found.effects] == ["cubic_stiffness"]
+    assert found.effects[0].value == pytest.approx(SOFTENING, rel=0.03)
+    assert found.verdict == "effect"
+
+
+SOFTENING = -0.2 * CUBIC
+
 @pytest.mark.parametrize("factor", [0.6, pytest.param(1.9, marks=pytest.mark.slow)])
 def test_the_damping_of_a_slow_machine_without_a_spring_is_found(factor: float) -> None:
     """Restarted four times a second, a machine of 1.7 s followed a record of any damping."""

@@ -52,6 +52,17 @@ def test_bob_weight_offset_and_cubic_stand_in_the_balance() -> None:
     assert K * x[-1] + 4.0e4 * x[-1] ** 3 == pytest.approx(40.0 + 3.0 - 12.0 * 1.5, rel=1e-9)
 
 
+def test_a_softening_spring_yields_and_runs_to_its_stop_beyond_its_greatest_force() -> None:
+    """K·x + k₃·x³ is greatest at x² = K/(3·|k₃|), within the travel, with two thirds of K·x."""
+    at, travel = 0.08, 0.1778
+    rig = bench({**PLAIN, "cubic_N_per_m3": -K / (3.0 * at**2)})
+    x = push(rig, lambda t: (2.0 / 3.0) * K * at * np.clip(t / 10.0, 0.0, 1.0) * 0.9, 20.0)
+    assert K * x[-1] * (1.0 - x[-1] ** 2 / (3.0 * at**2)) == pytest.approx(0.6 * K * at, rel=1e-6)
+    assert x[-1] < at
+    over = push(rig, lambda t: (2.0 / 3.0) * K * at * np.clip(t / 10.0, 0.0, 1.0) * 1.1, 20.0)
+    assert over[-1] == pytest.approx(travel)
+
+
 def test_a_control_released_inside_the_friction_band_does_not_creep() -> None:
     rig = bench({**PLAIN, "friction_N": 10.0})
     x = push(rig, lambda t: np.where(t < 30.0, np.minimum(25.0, t), 15.0), 90.0)

@@ -62,8 +62,9 @@ def duffing(
     to_Hz: float = 30.0,
     noise: tuple[float, float] = (0.0, 2e-6),
     seed: int = 1,
+    cubic: float = CUBIC,
 ) -> Record:
-    """Return a record of a mass on a hardening spring under a broadband force.
+    """Return a record of a mass on a cubic spring under a broadband force.
 
     m·x'' + c·x' + k·x + k₃·x³ = F; `noise` is added to F in N and to x in m.
     """
@@ -73,7 +74,7 @@ def duffing(
 
     def rates(t: float, y: Floats) -> tuple[float, float]:
         pull = force_N * float(shape(np.asarray(t))) * min(t, 1.0)
-        return y[1], (pull - DAMPING * y[1] - STIFFNESS * y[0] - CUBIC * y[0] ** 3) / MASS_kg
+        return y[1], (pull - DAMPING * y[1] - STIFFNESS * y[0] - cubic * y[0] ** 3) / MASS_kg
 
     way = solve_ivp(rates, (0.0, times[-1]), (0.0, 0.0), "DOP853", times, rtol=1e-8, atol=1e-10)
     pull = force_N * shape(times) * np.minimum(times, 1.0)

@@ -123,7 +123,7 @@ LOADER: tuple[Effect, ...] = (
     _effect(
         "cubic_stiffness",
         _BY_DEFLECTION,
-        added("cubic_N_per_{d}3", "loader.cubic_N_per_{d}3", 0, 1e9, 2e4, 2e6),
+        added("cubic_N_per_{d}3", "loader.cubic_N_per_{d}3", -1e9, 1e9, 2e4, 2e6),
     ),
     _effect("breakout", _BY_DEFLECTION, added("breakout_N", "loader.breakout_N", 0, 60, 2.0)),
     _effect(
