@@ -76,6 +76,7 @@ def test_a_softening_spring_is_found_under_a_broadband_force() -> None:
 
 SOFTENING = -0.2 * CUBIC
 
+
 @pytest.mark.parametrize("factor", [0.6, pytest.param(1.9, marks=pytest.mark.slow)])
 def test_the_damping_of_a_slow_machine_without_a_spring_is_found(factor: float) -> None:
     """Restarted four times a second, a machine of 1.7 s followed a record of any damping."""

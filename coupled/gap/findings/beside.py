@@ -5,7 +5,10 @@ describes: beside damping by the square of the speed, viscous damping is too lar
 correct the size, since it contains a straight line, whose slope is the size. The closed form of the
 curve contains no straight line. The effects found are therefore searched again with the closed form
 in the nominal rig. Their sizes and probabilities are those of this search. An effect that the
-search does not select was an approximation of the curve.
+search does not select was an approximation of the curve, and is not in the improved rig.
+
+The size of the closed form is that of a linear model, with a straight line beside it. If the form
+without effects has more evidence at another size, all effects were approximations.
 """
 
 from __future__ import annotations
@@ -14,6 +17,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from scipy.optimize import minimize_scalar
+
 from coupled.gap.findings.answer import effects_of
 from coupled.gap.findings.curves import Curves
 from coupled.gap.findings.judge import Judge
@@ -21,10 +26,11 @@ from coupled.gap.findings.result import EffectResult
 from coupled.gap.search.beam import search_sets
 from coupled.gap.search.case import Case
 from coupled.gap.search.descent import Descent
+from coupled.gap.search.evidence import evidence, evidence_of, fewest_unexplained
 from coupled.gap.search.found import Choice, Fit
 from coupled.gap.search.problem import Problem
 from coupled.gap.signals.output import explained_below
-from coupled.gap.thresholds import LESSER
+from coupled.gap.thresholds import DOUBLED, LESSER
 from coupled.rig.rig import Rig
 
 
@@ -53,35 +59,58 @@ def beside_closed_form(
     if formed is None or not effects:
         return None
     before = judge.choice
-    after, choice = search_sets(
-        replace(case, nominal=formed.rig), [step.effect for step in before.steps]
-    )
+    beside = search_sets(replace(case, nominal=formed.rig), [one.effect for one in before.steps])
+    sized = formed.scaled(case, _best_scale(case, formed))
+    if sized is not None:
+        alone = search_sets(replace(case, nominal=sized.rig), [])
+        if _is_likelier(case, before, alone, beside):
+            formed, beside = sized, alone
+    after, choice = beside
     if not _explains_as_much(case, before, choice.fit.rig, curves.rig):
         return None
     again = replace(judge, outputs=after.outputs, choice=choice, last=after.gaps(choice.fit.rig))
-    sized = {one.name: one for one in effects_of(after, choice, judge.readers, again.stages())}
-    left = {one.name for one in effects} - sized.keys()
+    kept = {one.name: one for one in effects_of(after, choice, judge.readers, again.stages())}
+    left = {one.name for one in effects} - kept.keys()
     odds = {name: math.exp(min(choice.tried.get(name, -math.inf), 0.0)) for name in left}
     formed = replace(formed, rig=choice.fit.rig, instead=odds)
     found, own = choice.fit, Descent("own")
     fitted = Problem(after).fit(found.effects, found.values, descent=own, part="fitted")
     return Beside(
-        tuple(sized.get(one.name, formed.probable(one)) for one in effects),
-        replace(before, fit=_without_curve(case, before.fit, found)),
-        _without_curve(case, before.fit, fitted),
+        tuple(kept.get(one.name, formed.probable(one)) for one in effects),
+        replace(before, fit=_without_curve(case, found)),
+        _without_curve(case, fitted),
         formed,
     )
 
 
-def _without_curve(case: Case, before: Fit, beside: Fit) -> Fit:
-    """Return a fit with the sizes beside a curve, and the rig with them but without the curve."""
-    found = replace(
-        before,
-        values={**before.values, **beside.values},
-        low={**before.low, **beside.low},
-        high={**before.high, **beside.high},
-    )
-    return replace(found, rig=case.with_only(found, found.effects))
+def _best_scale(case: Case, formed: Curves) -> float:
+    """Return the factor on a closed form of the least misfit without effects."""
+    problem = Problem(case)
+    error = problem.model_error(case.nominal)
+    samples = evidence_of(problem, formed.rig, error, 0.0).samples
+
+    def worse(scale: float) -> float:
+        sized = formed.scaled(case, scale)
+        if sized is None:
+            return math.inf
+        return -evidence_of(problem, sized.rig, error, 0.0).log(samples)
+
+    return float(minimize_scalar(worse, bounds=(1.0 / DOUBLED, DOUBLED), method="bounded").x)
+
+
+def _is_likelier(
+    case: Case, before: Choice, one: tuple[Case, Choice], other: tuple[Case, Choice]
+) -> bool:
+    """Tell whether a search has found at least the evidence of another with another curve."""
+    error = Problem(case).model_error(before.without_effects.rig)
+    known = [evidence(Problem(at), choice.fit, error) for at, choice in (one, other)]
+    samples = fewest_unexplained(known)
+    return known[0].log(samples) >= known[1].log(samples)
+
+
+def _without_curve(case: Case, beside: Fit) -> Fit:
+    """Return a fit of effects beside a curve, with the rig without the curve."""
+    return replace(beside, rig=case.with_only(beside, beside.effects))
 
 
 def _explains_as_much(case: Case, choice: Choice, rig: Rig, curved: Rig) -> bool:

@@ -162,12 +162,7 @@ class Curves:
         form = self.found[0].form if len(self.found) == 1 else None
         if form is None or form.curve is None:
             return None
-        (one,) = self.found
-        law = next(law for law in LAWS if one.key == f"controls.{case.control}.{law.key}")
-        rig = with_curve(case.nominal, case.control, law, *form.curve)
-        if rig is None:
-            return None
-        nodes, values = form.curve
+        (nodes, values), (one,) = form.curve, self.found
         drawn = replace(
             one,
             nodes=tuple(nodes.tolist()),
@@ -175,7 +170,21 @@ class Curves:
             low=tuple((values - form.errors).tolist()),
             high=tuple((values + form.errors).tolist()),
         )
-        return replace(self, found=(drawn,), rig=rig)
+        return replace(self, found=(drawn,)).scaled(case, 1.0)
+
+    def scaled(self, case: Case, scale: float) -> Curves | None:
+        """Return the only curve times a factor, with the nominal rig; None if no rig has it."""
+        (one,) = self.found
+        law = next(law for law in LAWS if one.key == f"controls.{case.control}.{law.key}")
+        own = np.array(one.values)
+        rig = with_curve(case.nominal, case.control, law, np.array(one.nodes), scale * own)
+        if rig is None:
+            return None
+        values, low, high = (
+            tuple((np.array(each) + (scale - 1.0) * own).tolist())
+            for each in (one.values, one.low, one.high)
+        )
+        return replace(self, found=(replace(one, values=values, low=low, high=high),), rig=rig)
 
 
 def find_curves(
