@@ -278,7 +278,7 @@ def unit_doubt(ratio: float, turned: bool) -> str | None:
         return "was N already, not lbf?"
     if 1.0 / FAR_RATIO < size < FAR_RATIO:
         return None
-    says = f"is {size:.2g} of gradient times deflection"
+    says = f"is {size:.2g} times the spring's force (gradient times deflection)"
     for units, kind in ((FORCES, "force"), (_ANGLE if turned else _LENGTHS, "deflection")):
         for word, factor in units.items():
             wrong = size * factor if kind == "force" else size / factor

@@ -324,8 +324,8 @@ def test_a_force_in_pounds_is_seen_against_the_rig(tmp_path: Path) -> None:
         (1 / 9.807, "the force in kgf or daN?"),
         (0.0254, "the deflection in in?"),
         (0.01, "the deflection in cm?"),
-        (0.4, "is 0.4 of gradient times deflection: another unit, scale or rig?"),
-        (-3.0, "is 3 of gradient times deflection: another unit, scale or rig?"),
+        (0.4, "is 0.4 times the spring's force (gradient times deflection): another unit, "),
+        (-3.0, "is 3 times the spring's force (gradient times deflection): another unit, "),
     ],
 )
 def test_a_force_far_from_its_springs_is_in_doubt(factor: float, says: str | None) -> None:
