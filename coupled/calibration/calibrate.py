@@ -15,7 +15,7 @@ from coupled.calibration.assumedscales import stale
 from coupled.calibration.errors_in_variables import errors_in_variables
 from coupled.calibration.estimate import Instruments, usual_instruments
 from coupled.calibration.fit import condition, normal_equations, ordinary
-from coupled.calibration.readingchecks import find_unit_doubts, find_zeros, refuse_poor
+from coupled.calibration.readingchecks import SURELY, find_unit_doubts, find_zeros, refuse_poor
 from coupled.calibration.readings import Readings
 from coupled.calibration.readingsfile import read_readings
 from coupled.calibration.result import CalibrationResult
@@ -107,7 +107,7 @@ def calibrate_control(
         raise InputError(
             file, "", "the fit does not converge; the readings are insufficient"
         ) from None
-    if fit.line.bend.high < 0.0:
+    if fit.line.bend.value < -fit.line.bend.half_width_at(SURELY):
         problem = "K is negative, and no structure bends against its force"
         raise InputError(file, "", f"{problem}; check v1, and the gradient set of each reading")
     there = f != 0.0

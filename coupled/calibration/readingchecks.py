@@ -24,7 +24,7 @@ FEWEST_CROSSED = 2  # readings with a force on another control
 INSEPARABLE = 1e3  # condition number of δ, F and the forces on others, each scaled
 FAR = 0.1  # of the largest; a smaller deflection may have any sign
 BEYOND_TRAVEL = 1.5  # of the travel; a larger deflection is in a wrong unit
-SURELY = 0.999  # confidence that the gradients differ, and that a zero is off
+SURELY = 0.999  # confidence that the gradients differ, that a zero is off, that K is negative
 
 
 def refuse_poor(
