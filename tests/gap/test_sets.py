@@ -238,6 +238,25 @@ def test_a_residual_within_its_limit_has_no_effect_of_a_fixed_size() -> None:
     assert names(found([arc], [BY_NAME["arc_geometry"]])) == set()
 
 
+@pytest.mark.parametrize("size", [0.3, 0.8])
+def test_beside_an_effect_noise_not_quite_as_modelled_has_no_other(size: float) -> None:
+    """A gust of 7 mm/s, at 0.89, took 1.02 noise floors to 1.01 beside an effectiveness."""
+
+    def loader(rig: Rig) -> Floats:
+        return np.asarray(rig.controls["column"].loader.offset * FIRST)
+
+    def beside(rig: Rig) -> Floats:
+        return np.asarray(rig.controls["column"].loader.bob_weight * SECOND)
+
+    first = output(20.0 * FIRST + 2.0 * UNKNOWN + NOISE, loader)
+    second = replace(output(size * SECOND + OTHER, beside), channel="beside")
+    assert (second.gap(bench()) < second.limit) == (size < 0.5)
+    assert names(found([first, second], [OFFSET, WEIGHT])) == {
+        "force_offset",
+        *(["bob_weight"] if size > 0.5 else []),
+    }
+
+
 def test_what_lies_far_below_a_noise_floor_outweighs_no_gap() -> None:
     """Beside an offset of 16 noise floors, δ̂ goes from 0.005 to 0.064 of its own."""
 

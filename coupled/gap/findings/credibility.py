@@ -10,7 +10,7 @@
    It is small for a wrong effect, since functions of the signals remove the same. The comparison is
    omitted for effects from outside the stage, such as gusts. The motion of an aircraft is no
    function of its present signals, so the residual of the airframe counts in full, also against a
-   sensor of its motion.
+   sensor of its motion, and of each effect relative to the gap that it closes beside the others.
 3. Cancellation. If an output has no gap without effects, the action of a cause on this output is
    below the noise. If two effects act by more than the noise and cancel, neither is credible.
 
@@ -35,7 +35,7 @@ from coupled.gap.findings.where import free_share, response, signals
 from coupled.gap.noise.smooth import smoothed
 from coupled.gap.search.case import Case
 from coupled.gap.search.found import Fit
-from coupled.gap.signals.output import Floats, Output
+from coupled.gap.signals.output import Floats, Output, explained_below
 from coupled.gap.signals.reading import PRESSURE
 from coupled.gap.thresholds import DRIFT, DRIFT_CHANCE, FEW, HOST_DRIFT, PARTLY, SMALL
 from coupled.record.record import Record
@@ -264,12 +264,24 @@ def credibility(
     plain = Credibility(regimes(case, acts), remainder=remains, undone=undone)
     if effect.stage == "schedule":
         return replace(plain, exact=True)
-    if remains < FEW or not acts or effect.signature.drawing == "time":
+    if not acts or effect.signature.drawing == "time":
         return plain
-    if {*effect.shows_in} == {AIRFRAME}:
-        return replace(plain, in_full=True)
     most = max(acts, key=lambda one: float(one.action @ one.action))
+    if {*effect.shows_in} == {AIRFRAME}:
+        return replace(plain, in_full=True, remainder=max(remains, _beside_others(most)))
+    if remains < FEW:
+        return plain
     return replace(plain, beside_flexible=_beside_flexible(case, found, most))
+
+
+def _beside_others(one: Acts) -> float:
+    """Return the weight of an output's residual, relative to the gap that an effect alone closes.
+
+    What a correct larger effect leaves, by an error of its own model, may be closed in part by a
+    wrong one.
+    """
+    gap, left = (math.sqrt(float(np.mean(x**2))) for x in (one.left + one.action, one.left))
+    return remainder(gap, left, explained_below(gap, one.output.limit))
 
 
 def _undone(case: Case, found: Fit, acts: Sequence[Acts]) -> float:

@@ -27,7 +27,7 @@ from coupled.gap.effects.effect import Effect, contains, distinct, keys_of, valu
 from coupled.gap.effects.settings import is_dry
 from coupled.gap.search.case import Case
 from coupled.gap.search.descent import Descent
-from coupled.gap.search.evidence import Evidence, evidence, fewest_unexplained
+from coupled.gap.search.evidence import Evidence, evidence, fewest_unexplained, misfit
 from coupled.gap.search.found import Candidate, Choice, Fit, Found
 from coupled.gap.search.problem import ModelError, Problem
 from coupled.gap.search.screen import Screen, Screened, Worth
@@ -129,6 +129,8 @@ class Beam:
         valid = list[Names]()
         for names in sorted(self.fits, key=lambda one: _numbers(self.fits[one])):
             fitted = self.fits[names]
+            if self._has_an_effect_within_noise(fitted):
+                continue
             if not names or is_admissible(self.problem, fitted, self._needed(fitted, valid)):
                 valid.append(names)
         if not len(self.counts):
@@ -159,6 +161,33 @@ class Beam:
             return here - max(without, default=here) > VERY_STRONG
 
         return frozenset(effect.name for effect in fitted.effects if is_needed(effect))
+
+    def _has_an_effect_within_noise(self, fitted: Fit) -> bool:
+        """Tell whether a library effect, beside others, improves only outputs within their noise.
+
+        Noise that is not quite as modelled is explained by some effect (`_choose`). In the outputs
+        that are over their limits without the effect, it gains less than its prior penalty.
+        """
+        names = names_of(fitted.effects)
+        if len(names) < 2 or not len(self.counts):
+            return False
+        problem, variance = self.problem, self.error.variance
+        smooth = self.error.smooth(self.counts)
+        here = misfit(self.known[names].squares, smooth)
+
+        def is_within_noise(effect: Effect) -> bool:
+            rest = names - {effect.name}
+            if effect.of or rest not in self.known:
+                return False
+            gaps = np.sqrt(self.known[rest].squares * variance)
+            if relief_of(self.fits[rest]) > PRIOR_EFFECT:  # it may have absorbed the effect
+                rig = problem.within_tolerance(self.fits[rest]).rig
+                gaps = np.array([output.gap(rig) for output in problem.outputs])
+            over = gaps > np.array([output.limit for output in problem.outputs])
+            gains = 0.5 * self.counts * (misfit(gaps**2 / variance, smooth) - here)
+            return float(gains[over].sum()) < PRIOR_EFFECT
+
+        return any(map(is_within_noise, fitted.effects))
 
     def ranked(self) -> list[Names]:
         """Return the admissible sets, the one of highest evidence first."""
