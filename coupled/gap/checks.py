@@ -24,6 +24,7 @@ from coupled.errors import InputError, joined, nearest
 from coupled.flight.aircraft import make_aircraft
 from coupled.flight.altered import STILL
 from coupled.flight.everyframe import PROPERTIES
+from coupled.gap.signals.live import measured_stretches
 from coupled.gap.signals.output import Floats, Output, estimate_noise
 from coupled.gap.signals.reading import PRESSURE
 from coupled.gap.stages.surfaces import start_of, states_trim, surface_channel, surface_points
@@ -620,6 +621,26 @@ def motion_alone(records: Mapping[str, Record]) -> dict[str, Record]:
         data = np.column_stack([record[name] for name in kept])
         found[file] = Record(tuple(kept), data, record.manifest)
     return found
+
+
+def without_dropouts(records: Mapping[str, Record]) -> tuple[dict[str, Record], list[str]]:
+    """Return the records of an aircraft alone without filled dropouts, and a sentence on each.
+
+    The surfaces in a dropout are not known, nor the motion after it. Of the stretches that begin in
+    trim the longest is judged; if all are too short, the whole record.
+    """
+    found, said = dict(records), []
+    for file, record in records.items():
+        known = [one for one in measured_stretches(record) if not not_in_trim(one, file)]
+        longest = max(known, key=len, default=record)
+        span_s = longest.time_s[[0, -1]] - record.time_s[0]
+        if len(longest) < len(record) and np.ptp(span_s) >= SHORTEST_RECORD_s:
+            found[file] = longest
+            said.append(
+                f"Rows of {file} repeat all channels, as in a dropout: it is judged from "
+                f"{span_s[0]:.2f} to {span_s[1]:.2f} s only."
+            )
+    return found, said
 
 
 def check_levers(record: Record, file: str) -> None:

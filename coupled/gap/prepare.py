@@ -44,6 +44,7 @@ from coupled.gap.checks import (
     trim_in,
     trim_speed,
     trimmed,
+    without_dropouts,
 )
 from coupled.gap.effects.effect import Effect, keys_of
 from coupled.gap.effects.library import library_of
@@ -166,8 +167,9 @@ def prepare(
     control = part.control
     live = [one for one in map(live_of, records.values()) if one is not None]
     records = {file: judged_part(record, file) for file, record in records.items()}
+    dropped = list[str]()
     if not rig.controls:
-        records = motion_alone(records)
+        records, dropped = without_dropouts(motion_alone(records))
         rig = at_rate_of(rig, records)
     each = list(records.values())
     rig = as_driven(rig, each, control) if control in rig.controls else rig
@@ -203,7 +205,7 @@ def prepare(
         for file, one in records.items()
         for words in not_measured(one, own, file, set_points, motion)
     ]
-    left_out = [stepped, *(why for one in live for why in one.left_out), *repeated]
+    left_out = [stepped, *dropped, *(why for one in live for why in one.left_out), *repeated]
     left_out += [
         f"{channel(control, 'modifying_force')} of {file} was computed from the recorded "
         f"{channel(control, 'computed')}: it cannot discriminate analog and digital multipliers."

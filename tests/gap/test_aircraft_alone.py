@@ -126,6 +126,21 @@ def test_a_log_of_the_same_model_has_no_gap(healthy: Record) -> None:
     assert repr(found) == "Diagnosis(c172p, airframe: no_gap)"
 
 
+@pytest.mark.parametrize("first", [900, 300])
+def test_a_filled_dropout_in_all_channels_ends_what_is_judged(healthy: Record, first: int) -> None:
+    """The surfaces in it are unknown: 0.3 s gave a gap that no effect explains, after 102 s."""
+    record = with_noise(healthy)
+    record.data[first : first + 40, 1:] = record.data[first, 1:]
+    prepared = prepare(alone(), {"log": record}, AIRFRAME)
+    said = [words for words in prepared.left_out if "log repeat all channels" in words]
+    if first < 600:  # before it too little, and after it no trim
+        assert (len(prepared.records["log"]), said) == (len(record), [])
+        return
+    assert len(prepared.records["log"]) == first + 1
+    assert "it is judged from 0.00 to 7.50 s only" in said[0]
+    assert max(prepared.case.gaps(prepared.case.nominal).values()) < 1.2
+
+
 def test_a_log_to_the_east_is_flown_to_the_east(tmp_path: Path) -> None:
     """The Earth turns: an aircraft is lighter by 2·Ω·v there, 8e-4 of its weight at 55 m/s."""
     properties = (*PROPERTIES, "attitude/psi-rad")

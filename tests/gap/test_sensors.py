@@ -124,8 +124,17 @@ def test_a_sensor_that_stands_still_while_the_control_moves_is_named(value: floa
     data[:, 1] += 0.02 * np.random.default_rng(5).standard_normal(len(data))
     data[510:530, 1] = data[510, 1] if value is None else value
     [said] = not_measured(Record(NAMES, data), "column", "r.csv")
-    stuck = f"stands still at {data[510, 1]:.4g} over rows 512 to 531"
+    stuck = "stands still over rows 512 to 531"
     assert f"column_force_N of r.csv {stuck}" in said
+
+
+def test_sensors_that_stand_still_over_the_same_rows_have_one_sentence() -> None:
+    data = moved(1.0).data.copy()
+    data[:, 1] += 0.02 * np.random.default_rng(5).standard_normal(len(data))
+    data[510:530, 1] = data[510, 1]
+    data[:, 2] = 0.5 * data[:, 1]
+    [said] = not_measured(Record(NAMES, data), "column", "r.csv")
+    assert said.startswith("Each of column_force_N and column_computed_m of r.csv stands still")
 
 
 def test_a_reading_that_repeats_for_another_reason_is_not_named() -> None:

@@ -15,7 +15,7 @@ values in use at each row.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -51,6 +51,7 @@ from coupled.record.channels import (
     LOST,
     REPEATED,
     SWITCHED,
+    TIME,
     VALIDITY,
     channel,
     unit_of,
@@ -157,7 +158,8 @@ def _validity(record: Record, live: Mapping[str, Any]) -> Floats | None:
         return record[VALIDITY]
     spells = live.get("spells") or []
     if not spells:
-        repeated = _repeated(record)
+        present = [channel(control, q) for control in CONTROL_NAMES for q in MEASURED]
+        repeated = _repeated(record, present)
         return np.where(repeated, float(REPEATED), FRESH) if repeated.any() else None
     found = np.zeros(len(record))
     for spell in spells:
@@ -170,13 +172,23 @@ def _validity(record: Record, live: Mapping[str, Any]) -> Floats | None:
     return found
 
 
-def _repeated(record: Record) -> Mask:
+def measured_stretches(record: Record) -> list[Record]:
+    """Return the stretches of a flight's record between rows that repeat all of its channels.
+
+    Of repeated rows, a few milliseconds are left in.
+    """
+    frame_s = float(np.median(np.diff(record.time_s)))
+    repeated = _repeated(record, [name for name in record.channels if name != TIME])
+    lost = repeated & ~_short_runs(repeated, max(1, round(BRIDGED_s / frame_s)))
+    return [record.rows(run.start, run.stop) for run in _runs(~lost)]
+
+
+def _repeated(record: Record, names: Iterable[str]) -> Mask:
     """Return the rows that repeat all readings of the row before, as a filled dropout does.
 
     None if the noise of the readings may repeat by chance, or if the log is slower than its rows.
     """
-    present = [channel(control, q) for control in CONTROL_NAMES for q in MEASURED]
-    readings = [record[name] for name in present if name in record]
+    readings = [record[name] for name in names if name in record]
     found = np.zeros(len(record), dtype=bool)
     if readings:
         found[1:] = np.all(np.diff(readings) == 0.0, axis=0)

@@ -140,7 +140,7 @@ def held(values: Floats, most_rows: float = math.inf) -> str:
         return ""
     k = int(np.argmax(lengths * stuck))
     rows = f"rows {begins[k] + 2} to {begins[k] + lengths[k] + 2}"
-    return f"stands still at {values[begins[k]]:.4g} over {rows}"
+    return f"stands still over {rows}"
 
 
 def chance_of_repeats(values: Floats) -> float:
