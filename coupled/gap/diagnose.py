@@ -33,6 +33,7 @@ from coupled.gap.findings.curves import find_curves
 from coupled.gap.findings.diagnosis import Diagnosis, PartDiagnosis, WholeDiagnosis
 from coupled.gap.findings.gear import by_other_gear
 from coupled.gap.findings.healthy import Baseline, beside_healthy
+from coupled.gap.findings.hints import late_channels, still_surfaces
 from coupled.gap.findings.judge import Judge
 from coupled.gap.findings.result import EffectResult, StageResult, Verdict
 from coupled.gap.findings.surfaceunit import in_other_unit
@@ -259,11 +260,13 @@ def findings(prepared: Prepared, case: Case, choice: Choice) -> PartDiagnosis:
             replace(one, probability=shares.get(one.name, 1.0) * one.probability) for one in effects
         )
         verdict = "ambiguous" if verdict in ("effect", "mostly") else verdict
-    by_gear, lone, untried = "" if gear is None else gear.words, "", ""
+    hints = ["" if gear is None else gear.words, *dict.fromkeys(units.values())]
     if verdict == "unexplained":
-        lone = lone_channel(outputs, case.nominal)
-    if verdict == "unexplained" and AIRFRAME in faulty and not lone:
-        untried = untried_terms(prepared.library, case.nominal)
+        of_channels = [lone_channel(outputs, case.nominal), late_channels(outputs, case.nominal)]
+        of_channels += [still_surfaces(records)] if AIRFRAME in faulty else []
+        hints += of_channels
+        if AIRFRAME in faulty and not any(of_channels):
+            hints.append(untried_terms(prepared.library, case.nominal))
     verdict, stages = beside_healthy(verdict, stages, baseline, change)
     filtered = (one.filtered().items() for one in readers) if part.own else ()
     return PartDiagnosis(
@@ -290,18 +293,7 @@ def findings(prepared: Prepared, case: Case, choice: Choice) -> PartDiagnosis:
         change=change,
         trim=prepared.trim,
         filtered={name: one for each in filtered for name, one in each},
-        left_out=tuple(
-            words
-            for words in (
-                *prepared.left_out,
-                by_gear,
-                *dict.fromkeys(units.values()),
-                lone,
-                unknown,
-                untried,
-            )
-            if words
-        ),
+        left_out=tuple(words for words in (*prepared.left_out, *hints, unknown) if words),
         inseparable=inseparable(fit, case.control),
         curved=curves,
     )

@@ -11,7 +11,7 @@ import pytest
 
 from coupled import diagnose as judge
 from coupled import fit, load_rig
-from coupled.errors import InputError
+from coupled.errors import InputError, joined
 from coupled.gap.chain import Part
 from coupled.gap.checks import (
     at_rate_of,
@@ -27,6 +27,7 @@ from coupled.gap.diagnose import diagnose, findings
 from coupled.gap.effects.library import BY_NAME
 from coupled.gap.findings.diagnosis import Diagnosis
 from coupled.gap.findings.flown import fly_force
+from coupled.gap.findings.hints import late_channels, still_surfaces
 from coupled.gap.findings.where import lone_channel
 from coupled.gap.prepare import finely_stepped, prepare
 from coupled.gap.search.beam import search_sets
@@ -34,7 +35,7 @@ from coupled.gap.search.histories import search
 from coupled.gap.signals.output import TRIM
 from coupled.gap.stages.airframe import airframe_outputs, unjudged_axes
 from coupled.gap.stages.openloop import is_throttled
-from coupled.record.channels import LATERAL, SURFACES
+from coupled.record.channels import LATERAL, RATE, SURFACES
 from coupled.record.importing.convert import import_log
 from coupled.record.record import Record
 from coupled.resources import shipped_rigs
@@ -265,6 +266,36 @@ def test_a_channel_that_alone_has_a_gap_is_named(
     words = lone_channel(outputs, rig)
     assert ("Of the motion yaw_rate_rad_per_s alone has a gap" in words) is told
     assert (words != "") is told
+
+
+def test_rates_that_are_late_are_named_with_their_delay(healthy: Record) -> None:
+    """Rates 100 ms late were a gap of 42 noise floors that no effect explains, without a hint."""
+    record, late = with_noise(healthy), healthy.time_s - 0.1
+    for name in RATE.values():
+        record.data[:, record.channels.index(name)] = np.interp(late, healthy.time_s, record[name])
+    prepared = prepare(alone(), {"log": record}, AIRFRAME)
+    words = findings(prepared, *search(prepared.case, [])).left_out
+    each = [f"{RATE[name]} (0.1 s)" for name in ("column", "wheel", "pedals")]
+    assert f"{joined(each)} are late, relative to the model: check the time stamps." in words
+    assert late_channels(prepared.case.outputs, prepared.case.nominal) in words
+
+
+@pytest.mark.slow
+def test_a_wrong_damping_or_a_right_model_is_not_late(tmp_path: Path, healthy: Record) -> None:
+    log, _ = flown(tmp_path, {"/Cmq": 0.5}, 12.0)
+    for record in (healthy, import_log(log)[0]):
+        case = prepare(alone(), {"log": with_noise(record)}, AIRFRAME).case
+        assert late_channels(case.outputs, case.nominal) == ""
+
+
+@pytest.mark.slow
+def test_an_elevator_that_stands_still_is_named_beside_a_gap(healthy: Record) -> None:
+    record, at = with_noise(healthy), healthy.channels.index("elevator_rad")
+    assert still_surfaces([record]) == ""
+    record.data[:, at] = record.data[0, at]
+    prepared = prepare(alone(), {"log": record}, AIRFRAME)
+    words = findings(prepared, *search(prepared.case, [])).left_out
+    assert "elevator_rad never changes: is a sensor stuck?" in words
 
 
 def test_a_small_offset_of_a_lone_channel_is_named(healthy: Record) -> None:
