@@ -104,6 +104,14 @@ def test_an_effect_that_acts_only_beside_another_has_no_share_of_its_own() -> No
     assert "-18" not in text
 
 
+def test_a_doubtful_effect_would_explain_what_it_may_not() -> None:
+    """Before the sentence on the gear, a drag at 0.00 explained 100 % of the gap."""
+    text = said("ambiguous", 1.1, 0.995, replace(FRICTION, probability=0.0))
+    assert "would explain 99.5 %" in text
+    assert " explains " not in text
+    assert " explains " in said("effect", 1.1, 0.995, replace(FRICTION, probability=0.9))
+
+
 def test_a_number_is_set_only_where_its_effect_is_credible() -> None:
     shares = (share("coulomb_friction", 0.8), share("force_offset", 0.1))
     budget = StageBudget("loader", shares, share("unexplained", 0.1), share("noise", 0.0))

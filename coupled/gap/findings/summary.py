@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -127,14 +127,13 @@ def _what(found: Findings, floor: str) -> str:
     acting = {stage.name: _acting(found, stage, budgets.get(stage.name)) for stage in stages}
     if not any(acting.values()) and found.verdict == "unexplained":
         return f"A gap in the {', '.join(found.guilty)} that no effect of the library explains."
-    said = [_uncertain(found)]
-    verb = "would explain" if said[0] else "explains"
+    said, sure = [_uncertain(found)], {one.name for one in _certain(found)}
     for stage in sorted(stages, key=lambda one: not acting[one.name]):
         ours = acting[stage.name]
         by_others = any({*ours} <= {*acting.get(name, ())} for name in stage.shown_in)
         # A stage without an output, with the effects of its neighbours, is not described again.
         if stage.left is not None or not ours or not by_others:
-            said.append(_explained(ours, stage, budgets.get(stage.name), floor, verb))
+            said.append(_explained(ours, stage, budgets.get(stage.name), floor, sure))
     return " ".join(sentence for sentence in said if sentence)
 
 
@@ -166,11 +165,11 @@ def _explained(
     stage: StageResult,
     budget: StageBudget | None,
     floor: str,
-    verb: str,
+    sure: Collection[str],
 ) -> str:
     """Return the share of a stage's gap that each effect explains, and what remains.
 
-    `verb` is `explains`, or `would explain` of effects without a certain one.
+    Effects that are not `sure` would explain it.
     """
     if budget is None:
         return f"The gap lies in the {stage.name}."
@@ -187,6 +186,7 @@ def _explained(
         one = [effect, *beside] if effect is main else [effect]
         share = _per_cent(sum(budget.of(e.name) for e in one))
         words = " with ".join(_effect(e) for e in one)
+        verb = "explains" if effect.name in sure else "would explain"
         shares.append(f"{words}{',' if one[-1].parameters else ''} {verb} {share}")
     said = f"{capital(' and '.join(shares))} of the {stage.name}'s gap"
     over = stage.left is not None and stage.limit is not None and stage.left > stage.limit
@@ -218,8 +218,7 @@ def _set(found: Findings) -> str:
     """Return which values to set in host and rig file; of no effect or group that is uncertain."""
     if found.verdict not in ("effect", "mostly"):
         return ""
-    alike = {group[0]: len(group) for group in found.rivals}
-    known = [e for e in found.effects if e.probability * alike.get(e.name, 1) >= CERTAIN]
+    known = _certain(found)
     numbers = [p for effect in known for p in effect.parameters if not _is_none(p)]
     keys = [p.host or f"{dotted(p.key, found.control)} in the rig file" for p in numbers]
     found_values = [f"{figure(p.found)} {p.unit}".rstrip() for p in numbers]
@@ -229,6 +228,12 @@ def _set(found: Findings) -> str:
         key = dotted(one.key_on(found.control), found.control)
         said.append(f"Set {key} in the rig file to {json.dumps(one.on)}.")
     return " ".join(said)
+
+
+def _certain(found: Findings) -> list[EffectResult]:
+    """Return the effects that are certain, alone or together with their alternatives."""
+    alike = {group[0]: len(group) for group in found.rivals}
+    return [e for e in found.effects if e.probability * alike.get(e.name, 1) >= CERTAIN]
 
 
 def _settings(found: Findings) -> str:
