@@ -13,6 +13,7 @@ from coupled.flight.aircraft import make_aircraft
 from coupled.flight.levers import Levers
 from coupled.gap.checks import trimmed
 from coupled.gap.diagnose import diagnose
+from coupled.gap.signals.conditions import wrappers_of
 from coupled.record.importing.convert import import_log
 from coupled.record.levers import lever_channel, levers_of
 from coupled.record.record import Record
@@ -77,6 +78,27 @@ def test_one_throttle_moves_all_engines_and_several_their_own(
     assert tuple(less) == moves
 
 
+def test_a_throttle_at_rest_is_that_of_its_engine() -> None:
+    """Only those that move were passed on, and one that moves alone moved all engines."""
+    time_s = np.arange(480) / 120.0
+    cut = np.interp(time_s, [1.0, 2.0], [0.9, 0.4])
+    channels = ("time_s", "throttle_norm", "throttle_1_norm")
+    record = Record(channels, np.column_stack((time_s, cut, np.full(480, 0.9))))
+    flight = read_rig(shipped_rigs()["737"]).flight
+    assert flight is not None
+    acting = wrappers_of(record, 1.0 / 120.0)
+    folders = [aircraft_folder()]
+    made = make_aircraft(
+        flight, 1.0 / 120.0, ["column"], folders, record=THRUSTS, conditions=acting
+    )
+    before = made.extra()
+    for _ in range(480):
+        made.step((0.0, 0.0, 0.0))
+    first, second = (after / then for after, then in zip(made.extra(), before, strict=True))
+    assert first < 0.8
+    assert second == pytest.approx(1.0, abs=0.05)
+
+
 def stepped(at_s: float, by: float) -> Callable[[float], float]:
     return lambda time_s: by * min(max(2.0 * (time_s - at_s), 0.0), 1.0)
 
@@ -130,6 +152,17 @@ def test_flaps_that_a_log_begins_with_are_those_of_the_trim(tmp_path: Path) -> N
     without = [i for i, name in enumerate(record.channels) if name != "flap_norm"]
     unknown = Record(tuple(record.channels[i] for i in without), record.data[:, without])
     assert max(gaps(alone(), unknown, {}).values()) > 5.0
+
+
+def test_the_noise_of_a_throttle_at_rest_is_no_thrust(tmp_path: Path) -> None:
+    """The model's moved by the noise of the first row throughout: 4 noise floors of speed."""
+    record = log(tmp_path, "fcs/throttle-cmd-norm", 0.0)
+    for first in (-0.01, 0.01):
+        data = record.data.copy()
+        noise = np.random.default_rng(3).normal(scale=5e-3, size=len(data))
+        noise[0] = first
+        data[:, record.channels.index("throttle_norm")] = 0.7 + noise
+        assert max(gaps(alone(), Record(record.channels, data), {}).values()) < 1.5
 
 
 def test_a_lever_in_percent_is_refused(tmp_path: Path) -> None:

@@ -12,6 +12,7 @@ to the north; for a log of another program it starts at the heading of the log.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -22,6 +23,7 @@ from coupled.flight.event import trim_moved
 from coupled.flight.levers import Levers
 from coupled.flight.wrapper import Wrapper
 from coupled.gap.signals.output import Floats
+from coupled.gap.thresholds import SIGMAS, BRIEF_s
 from coupled.record.channels import ControlName
 from coupled.record.levers import levers_of
 from coupled.record.record import Record
@@ -63,9 +65,25 @@ def wrappers_of(record: Record, frame_s: float) -> list[Wrapper]:
         return acting
     if HEADING in record:
         acting.append(Headed(float(record[HEADING][0])))
-    moved = {name: record[name] for name in levers_of(record.channels) if np.ptp(record[name]) > 0}
     rate_Hz = (len(record) - 1) / float(record.time_s[-1] - record.time_s[0])
+    levers = levers_of(record.channels)
+    # A throttle at rest beside one that moves shows that each is that of an engine.
+    kinds = {kind for name, (kind, _) in levers.items() if np.ptp(record[name]) > 0.0}
+    rows = max(2, round(BRIEF_s * rate_Hz))
+    moved = {n: _from_rest(record[n], rows) for n, (kind, _) in levers.items() if kind in kinds}
     return [*acting, Levers(moved, frame_s * rate_Hz)] if moved else acting
+
+
+def _from_rest(positions: Floats, rows: int) -> Floats:
+    """Return a lever's positions, the first without noise if the lever rests over the first rows.
+
+    The model's lever is moved from trim by the difference from the first position.
+    """
+    start = positions[:rows]
+    halves = [float(np.mean(half)) for half in np.array_split(start, 2)]
+    noise = float(np.std(np.diff(start))) / math.sqrt(2.0)
+    rests = abs(halves[1] - halves[0]) <= SIGMAS * 2.0 * noise / math.sqrt(len(start))
+    return np.concatenate(([np.mean(start) if rests else start[0]], positions[1:]))
 
 
 class Headed(Wrapper):
