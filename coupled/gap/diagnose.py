@@ -33,7 +33,7 @@ from coupled.gap.findings.curves import find_curves
 from coupled.gap.findings.diagnosis import Diagnosis, PartDiagnosis, WholeDiagnosis
 from coupled.gap.findings.gear import by_other_gear
 from coupled.gap.findings.healthy import Baseline, beside_healthy
-from coupled.gap.findings.hints import late_channels, still_surfaces
+from coupled.gap.findings.hints import late_channels, still_surfaces, unknown_levers
 from coupled.gap.findings.judge import Judge
 from coupled.gap.findings.result import EffectResult, StageResult, Verdict
 from coupled.gap.findings.surfaceunit import in_other_unit
@@ -264,7 +264,7 @@ def findings(prepared: Prepared, case: Case, choice: Choice) -> PartDiagnosis:
     if verdict == "unexplained":
         of_channels = [lone_channel(outputs, case.nominal), late_channels(outputs, case.nominal)]
         of_channels += [still_surfaces(records)] if AIRFRAME in faulty else []
-        hints += of_channels
+        hints += [*of_channels, unknown_levers(records) if AIRFRAME in faulty else ""]
         if AIRFRAME in faulty and not any(of_channels):
             hints.append(untried_terms(prepared.library, case.nominal))
     verdict, stages = beside_healthy(verdict, stages, baseline, change)

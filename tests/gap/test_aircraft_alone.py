@@ -27,7 +27,7 @@ from coupled.gap.diagnose import diagnose, findings
 from coupled.gap.effects.library import BY_NAME
 from coupled.gap.findings.diagnosis import Diagnosis
 from coupled.gap.findings.flown import fly_force
-from coupled.gap.findings.hints import late_channels, still_surfaces
+from coupled.gap.findings.hints import late_channels, still_surfaces, unknown_levers
 from coupled.gap.findings.where import lone_channel
 from coupled.gap.prepare import finely_stepped, prepare
 from coupled.gap.search.beam import search_sets
@@ -365,6 +365,17 @@ def test_a_throttle_that_moves_is_seen_by_an_aircraft_alone(healthy: Record) -> 
 
     assert throttled("throttle_percent")
     assert not throttled("throttle_norm")  # the model's is moved alike
+
+
+def test_levers_that_a_log_does_not_have_are_named(healthy: Record) -> None:
+    assert "throttle_norm, flap_norm and gear_norm" in unknown_levers([healthy])
+    given = Record(
+        (*healthy.channels, "throttle_1_norm"),
+        np.column_stack([healthy.data, np.full(len(healthy), 0.7)]),
+    )
+    assert unknown_levers([given]).endswith(": flap_norm and gear_norm.")
+    manifest = {"rig": {"flight": {"model": "c172p"}}}
+    assert unknown_levers([Record(healthy.channels, healthy.data, manifest)]) == ""
 
 
 def test_a_rig_takes_the_frame_rate_of_a_log_and_keeps_its_own_steps(healthy: Record) -> None:

@@ -9,9 +9,10 @@ import numpy as np
 from coupled.errors import joined
 from coupled.gap.chain import AIRFRAME
 from coupled.gap.signals.output import TRIM, Output
-from coupled.gap.stages.surfaces import surface_channel
+from coupled.gap.stages.surfaces import states_trim, surface_channel
 from coupled.gap.thresholds import NEARLY_ALL, WINDOW_s
 from coupled.record.channels import CONTROL_NAMES
+from coupled.record.levers import levers_of
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
 
@@ -53,3 +54,13 @@ def still_surfaces(records: Sequence[Record]) -> str:
     still = [name for name, each in values.items() if each and not any(map(np.ptp, each))]
     verb = "never changes" if len(still) == 1 else "never change"
     return f"{joined(still)} {verb}: is a sensor stuck?" if still else ""
+
+
+def unknown_levers(records: Sequence[Record]) -> str:
+    """Return a sentence on the levers that no record has; empty if the flight was simulated."""
+    if any(map(states_trim, records)):
+        return ""
+    recorded = {kind for one in records for kind, _ in levers_of(one.channels).values()}
+    lacking = [kind for kind in ("throttle", "flap", "gear") if kind not in recorded]
+    names = [f"{kind}_norm" for kind in lacking]
+    return f"Not recorded, and in the model as in trim: {joined(names)}." if names else ""
