@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from coupled.gap.chain import stage_of
-from coupled.gap.effects.effect import HOST_VALUES, Effect, Parameter, field_of
+from coupled.gap.effects.effect import HOST_VALUES, Effect, Parameter, field_of, touched
 from coupled.gap.effects.settings import contact, is_dry, settings
 from coupled.gap.findings.budget import StageBudget
 from coupled.gap.findings.credibility import credibility
@@ -23,7 +23,7 @@ from coupled.gap.noise.lines import other_side
 from coupled.gap.search.case import Case
 from coupled.gap.search.found import Choice, Fit, Found
 from coupled.gap.search.histories import course_in
-from coupled.gap.signals.output import Output
+from coupled.gap.signals.output import Output, stage_gaps
 from coupled.gap.stages.stages import Reader
 from coupled.gap.thresholds import (
     CERTAIN,
@@ -142,13 +142,18 @@ def effects_of(
     size contains the neutral value. If values cannot be separated, each interval may contain it,
     although they are not all neutral: then the evidence decides.
     """
-    remains = {stage.name: stage.remainder for stage in stages}
+    by_name = {stage.name: stage for stage in stages}
     records = [reader.record for reader in readers]
+
+    def remains(effect: Effect) -> float:
+        others = [other for other in choice.fit.effects if other is not effect]
+        without = stage_gaps(touched(case.outputs, [effect]), case.with_only(choice.fit, others))
+        judged = ((by_name.get(stage_of(output)), gap) for output, gap in without.items())
+        return max((stage.remainder(gap) for stage, gap in judged if stage), default=0.0)
 
     def result(step: Found) -> EffectResult:
         effect = step.effect
-        beside = max(remains.get(stage_of(output), 0.0) for output in effect.shows_in)
-        known = credibility(effect, case, choice.fit, records, beside)
+        known = credibility(effect, case, choice.fit, records, remains(effect))
         scatter = 0.0  # relative sampling error of a random quantity, over all records
         if effect.sampled is not None:
             errors = [effect.sampled.error(reader.rig, reader.record) for reader in readers]

@@ -8,14 +8,15 @@
 2. Comparison with a nonparametric model of the stage's own signals (`where`), if a residual
    remains. `beside_flexible` is the share of the model's residual that adding the effect removes.
    It is small for a wrong effect, since functions of the signals remove the same. The comparison is
-   omitted for effects from outside the stage, such as gusts. The motion of an aircraft is no
+   omitted for random effects, such as gusts. The motion of an aircraft is no
    function of its present signals, so the residual of the airframe counts in full, also against a
-   sensor of its motion, and of each effect relative to the gap that it closes beside the others.
+   sensor of its motion.
 3. Cancellation. If an output has no gap without effects, the action of a cause on this output is
    below the noise. If two effects act by more than the noise and cancel, neither is credible.
 
-The first two weigh more the more residual power remains (`remainder`). The result is one smooth
-number that scales the effect's probability.
+The first two weigh more the more residual power remains, of that without the effect (`remainder`):
+what another effect explains is no evidence for it. The result is one smooth number that scales the
+effect's probability.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ from coupled.gap.findings.where import free_share, response, signals
 from coupled.gap.noise.smooth import smoothed
 from coupled.gap.search.case import Case
 from coupled.gap.search.found import Fit
-from coupled.gap.signals.output import Floats, Output, explained_below
+from coupled.gap.signals.output import Floats, Output
 from coupled.gap.signals.reading import PRESSURE
 from coupled.gap.thresholds import DRIFT, DRIFT_CHANCE, FEW, HOST_DRIFT, PARTLY, SMALL
 from coupled.record.record import Record
@@ -242,11 +243,12 @@ class Credibility:
 def remainder(gap: float, left: float, explained_below: float, own: float = 1.0) -> float:
     """Return the weight of a stage's remaining residual as evidence against its effects, 0 to 1.
 
-    `gap` is the gap without effects, `left` that with them, `explained_below` the largest gap of
-    an explained stage. The weight grows with the excess of `left` over it, and with the share of
-    the gap that remains: effects that remove nearly all of a large gap are usually correct. `own`
-    is the gap that remains even if a nonparametric model is fitted with the effects. No function of
-    the stage's signals explains it, so it is not evidence against a law.
+    `gap` is the gap without the effect in question, beside all others, `left` that with it,
+    `explained_below` the largest gap of an explained stage. The weight grows with the excess of
+    `left` over it, and with the share of the gap that remains: an effect that removes nearly all of
+    a large gap is usually correct. `own` is the gap that remains even if a nonparametric model is
+    fitted with the effects. No function of the stage's signals explains it, so it is not evidence
+    against a law.
     """
     error = max(own, 1.0) ** 2
     more, known = max(left**2 - error, 0.0), explained_below**2 - 1.0
@@ -264,24 +266,12 @@ def credibility(
     plain = Credibility(regimes(case, acts), remainder=remains, undone=undone)
     if effect.stage == "schedule":
         return replace(plain, exact=True)
-    if not acts or effect.signature.drawing == "time":
+    if remains < FEW or not acts or effect.sampled is not None:
         return plain
-    most = max(acts, key=lambda one: float(one.action @ one.action))
     if {*effect.shows_in} == {AIRFRAME}:
-        return replace(plain, in_full=True, remainder=max(remains, _beside_others(most)))
-    if remains < FEW:
-        return plain
+        return replace(plain, in_full=True)
+    most = max(acts, key=lambda one: float(one.action @ one.action))
     return replace(plain, beside_flexible=_beside_flexible(case, found, most))
-
-
-def _beside_others(one: Acts) -> float:
-    """Return the weight of an output's residual, relative to the gap that an effect alone closes.
-
-    What a correct larger effect leaves, by an error of its own model, may be closed in part by a
-    wrong one.
-    """
-    gap, left = (math.sqrt(float(np.mean(x**2))) for x in (one.left + one.action, one.left))
-    return remainder(gap, left, explained_below(gap, one.output.limit))
 
 
 def _undone(case: Case, found: Fit, acts: Sequence[Acts]) -> float:

@@ -85,15 +85,19 @@ class StageResult:
         """Whether the gap that remains exceeds that of an explained stage."""
         return self.left is not None and self.left > self.explained_below
 
-    @property
-    def remainder(self) -> float:
-        """The weight of the remaining residual as evidence against the effects (`credibility`)."""
+    def remainder(self, without: float) -> float:
+        """Return the weight of the remaining residual as evidence against an effect.
+
+        `without` is the gap without this effect, beside the others (`credibility`).
+        """
         if self.left is None or self.settled is None:
             return 0.0
         own = 1.0
         if self.remains is not None and self.name in OF_THE_MACHINE:
             own = self.left * math.sqrt(1.0 - self.remains.free_share)
-        return remainder(self.settled, self.left, self.explained_below, own)
+        gap = min(self.settled, without)
+        limit = FAULTY_FROM if self.limit is None else self.limit
+        return remainder(gap, self.left, explained_below(gap, limit), own)
 
     @property
     def within_settings(self) -> bool:
