@@ -5,6 +5,8 @@ What each answer must be was written down before it was run.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -22,6 +24,21 @@ from tests.support.machines import damper, damper_rig
 from tests.support.rigs import BENCH, bench
 
 HEAVY_kg = 8.0
+
+
+@pytest.mark.slow
+def test_damping_that_falls_from_the_start_is_no_drift_of_a_sensor() -> None:
+    """The scale of a growing motion explained it nearly as well, and was certain."""
+    steady = damper(play_m=0.0)
+    force, falls = "column_force_N", np.linspace(0.0, 0.3, len(steady))
+    data = steady.data.copy()
+    data[:, steady.channels.index(force)] *= 1.0 - falls
+    found = diagnose(damper_rig(), {"r": replace(steady, data=data)})
+    (effect,) = found.effects
+    assert (effect.name, found.verdict) == ("viscous_damping", "effect")
+    assert effect.value == pytest.approx(0.7, rel=0.02)
+    assert effect.course is not None and effect.course.kind == "grows"
+    assert effect.course.onset_s is None
 
 
 def test_a_damper_beside_its_own_numbers_has_no_gap() -> None:

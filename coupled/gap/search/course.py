@@ -240,7 +240,8 @@ class Timing:
         onset = Bounds(self.onset_s, min(self.onset_s, seen.low), max(self.onset_s, seen.high))
         if not self.grows:
             return Course("from", onset)
-        return Course("grows", onset, value.times(1.0 / (lasted_s - self.onset_s)))
+        rate = value.times(1.0 / (lasted_s - self.onset_s))
+        return Course("grows", onset if self.onset_s > 0.0 else None, rate)
 
 
 def timing_of(parts: Sequence[tuple[Floats, Floats]], rate_Hz: float) -> Timing:

@@ -2,7 +2,8 @@
 
 A set of constant effects is searched first (`beam`). Where it leaves a stage unexplained, the time
 history of each effect that gained most is estimated. If one begins within the record, the outputs
-are predicted with its time history, and the search is repeated.
+are predicted with its time history, and the search is repeated. If the scale of a sensor drifts,
+other effects may grow from the record's start instead: the search is repeated with the likeliest.
 """
 
 from __future__ import annotations
@@ -14,11 +15,20 @@ import numpy as np
 from coupled.gap.effects.effect import Effect
 from coupled.gap.search.beam import search_sets
 from coupled.gap.search.case import Case
-from coupled.gap.search.course import Bounds, Course, course_of, course_of_events, timing_of
+from coupled.gap.search.course import (
+    Bounds,
+    Course,
+    Timing,
+    course_of,
+    course_of_events,
+    timing_of,
+)
+from coupled.gap.search.evidence import Evidence, evidence, fewest_unexplained
 from coupled.gap.search.found import Choice, Fit
 from coupled.gap.search.problem import Problem
 from coupled.gap.signals.output import Floats, unexplained
-from coupled.gap.thresholds import ENDS, PARTLY, ROUNDS, WINDOW_s
+from coupled.gap.thresholds import ENDS, PARTLY, RIVAL_GAIN, ROUNDS, WINDOW_s
+from coupled.parallel import in_threads
 from coupled.record.record import Record
 
 Parts = list[tuple[Floats, Floats]]  # action of an effect and residual, of each output
@@ -29,7 +39,39 @@ def search(case: Case, library: Sequence[Effect]) -> tuple[Case, Choice]:
     found = search_sets(case, library)
     while (later := _search_with_onset(*found, library)) is not None:
         found = later
-    return found
+    return _search_with_drift(*found, library) or found
+
+
+def _search_with_drift(
+    case: Case, found: Choice, library: Sequence[Effect]
+) -> tuple[Case, Choice] | None:
+    """Repeat the search with an effect that grows from the start, as likely as a sensor's drift.
+
+    None if no sensor drifts, or if its drift is far likelier than that of any other effect.
+    """
+    others = tuple(effect for effect in found.fit.effects if not effect.gradual)
+    shown = {o for effect in found.fit.effects if effect.gradual for o in effect.shows_in}
+    tries = [
+        (case.timed(one, Timing(0.0, grows=True), Bounds(0.0, 0.0, 0.0)), one)
+        for one in library
+        if len(one.free) == 1 and _is_constant(one, case) and one not in others
+        if shown & {*one.shows_in}
+    ]
+    if not tries or len({output.record for output in case.outputs}) > 1:
+        return None
+    problem = Problem(case)
+    error = problem.model_error(found.without_effects.rig)
+
+    def known(one: tuple[Case, Effect]) -> Evidence:
+        anew = Problem(one[0])
+        return evidence(anew, anew.fit((*others, one[1]), found.fit.values), error)
+
+    each = [evidence(problem, found.fit, error), *in_threads(known, tries)]
+    samples = fewest_unexplained(each)
+    sensor, *logs = (one.log(samples) for one in each)
+    if max(logs) < sensor - RIVAL_GAIN:
+        return None
+    return search_sets(tries[int(np.argmax(logs))][0], library)
 
 
 def _search_with_onset(
@@ -97,10 +139,7 @@ def in_time(effect: Effect, case: Case) -> Case | None:
     None if the effect acts from the start, or has no size. It is fitted alone, since other effects
     may have absorbed the error of a constant size.
     """
-    number = effect.free[0] if effect.free else None
-    sized = number is not None and not number.is_limit and not effect.gradual
-    events = effect.sampled is not None and effect.sampled.times is not None
-    if not sized or events or case.timing(effect) is not None:
+    if not _is_constant(effect, case):
         return None
     alone = Problem(case).fit((effect,))
     parts = _parts(effect, case, alone)
@@ -116,6 +155,14 @@ def in_time(effect: Effect, case: Case) -> Case | None:
     # Estimate again at the fitted size: friction and play are not linear in their size.
     ((_, ours),) = _parts(effect, case, Problem(anew).fit((effect,))).items()
     return case.timed(effect, timing_of(ours, rate_Hz), seen.onset_s)
+
+
+def _is_constant(effect: Effect, case: Case) -> bool:
+    """Tell whether an effect has a size, which is the same throughout the records."""
+    number = effect.free[0] if effect.free else None
+    sized = number is not None and not number.is_limit and not effect.gradual
+    events = effect.sampled is not None and effect.sampled.times is not None
+    return sized and not events and case.timing(effect) is None
 
 
 def _parts(effect: Effect, case: Case, found: Fit) -> dict[int, Parts]:
