@@ -42,6 +42,14 @@ def test_a_factor_of_the_size_of_another_unit_is_doubted(
     assert all(one.startswith(f"{surface}_rad may be in {unit} instead") for one in found.values())
 
 
+def test_an_effectiveness_that_may_be_none_shows_no_unit() -> None:
+    """A log that starts in a manoeuvre had one of 0.01, -0.004 to 0.03: a surface in per cent."""
+    number = ParameterEstimate("factor", 0.014, -0.004, 0.033)
+    assert (
+        in_other_unit(alone(), [EffectResult("elevator_effectiveness", "", 0.1, (number,))]) == {}
+    )
+
+
 @pytest.mark.slow
 def test_an_aileron_in_shares_of_its_travel_is_no_certain_effectiveness(tmp_path: Path) -> None:
     """It was an effectiveness of 0.30 with a probability of 0.89."""

@@ -35,9 +35,12 @@ def in_other_unit(rig: Rig, effects: Sequence[EffectResult]) -> dict[str, str]:
 
 
 def _possible(rig: Rig, control: ControlName, effect: EffectResult) -> list[str]:
-    """Return the units whose size in rad the interval of an effectiveness includes."""
+    """Return the units whose size in rad the interval of an effectiveness includes.
+
+    An interval that includes 0 shows no unit.
+    """
     (p,) = effect.parameters
-    if p.low is None or p.high is None:
+    if p.low is None or p.high is None or p.low <= 0.0:
         return []
     return [unit for unit, low, high in _units(rig, control) if p.low <= high and p.high >= low]
 
