@@ -32,6 +32,7 @@ from coupled.gap.thresholds import (
     DOUBLED,
     FAR_SIGMAS,
     KNOWN,
+    LESSER,
     MOST,
     NEGLIGIBLE,
     OTHER_SPEED,
@@ -109,7 +110,8 @@ def check_record(
 def check_units(rig: Rig, record: Record, control: ControlName, file: object) -> None:
     """Raise InputError if a channel has another unit or sign, by channels that determine it.
 
-    Checked before the trim is taken from the record, since a speed in knots has none.
+    Checked before the trim is taken from the record, since a speed in knots has none, nor has one
+    on the ground.
     """
     columns = _columns(record)
     found = other_units(columns, rig)
@@ -119,6 +121,8 @@ def check_units(rig: Rig, record: Record, control: ControlName, file: object) ->
         raise InputError(file, name, f"{one.reason}: it is in {one.unit}")
     for name, angle in reversed_rates(columns).items():
         raise InputError(file, name, f"moves against {angle}: one of them is reversed")
+    if rig.flight is not None:
+        _check_airborne(record, file)
 
 
 def _columns(record: Record) -> dict[str, Floats]:
@@ -326,6 +330,17 @@ def _check_schedule(rig: Rig, record: Record, control: ControlName, file: object
     if not 1.0 / DOUBLED < ratio < DOUBLED:
         problem = f"is {ratio:.3g} times what this rig's table gives: another rig's file?"
         raise InputError(file, gradient, problem)
+
+
+def _check_airborne(record: Record, file: object) -> None:
+    """Raise InputError if a record starts on the ground, at little of its largest airspeed."""
+    if SPEED not in record:
+        return
+    speed = record[SPEED]
+    rows = max(1, round(BRIEF_s * sampling_rate_of(record, file)))
+    if (start := float(np.mean(speed[:rows]))) < LESSER * float(np.max(speed)):
+        problem = f"starts at {start:.1f} m/s, on the ground; give the record from a trim in flight"
+        raise InputError(file, SPEED, f"{problem} on")
 
 
 def check_trim(trim_speed_m_per_s: float, record: Record, file: object) -> None:

@@ -127,6 +127,14 @@ def test_a_log_of_the_same_model_has_no_gap(healthy: Record) -> None:
     assert repr(found) == "Diagnosis(c172p, airframe: no_gap)"
 
 
+def test_a_log_that_starts_on_the_ground_is_refused(healthy: Record) -> None:
+    """The rig file was to blame: its model did not trim at the altitude of the ground."""
+    data, at = healthy.data.copy(), healthy.channels.index("true_airspeed_m_per_s")
+    data[:, at] *= np.minimum(healthy.time_s / 8.0, 1.0)
+    with pytest.raises(InputError, match=r"log: true_airspeed.*: starts at 3.* on the ground"):
+        diagnose(alone(), {"log": Record(healthy.channels, data)})
+
+
 @pytest.mark.parametrize("first", [900, 300])
 def test_a_filled_dropout_in_all_channels_ends_what_is_judged(healthy: Record, first: int) -> None:
     """The surfaces in it are unknown: 0.3 s gave a gap that no effect explains, after 102 s."""
