@@ -40,7 +40,7 @@ def test_a_gear_that_is_down_in_the_log_is_no_drag(tmp_path: Path) -> None:
     log, _ = import_log(flown(tmp_path, {}, 12.0, "T37")[0])
     found = beside_the_gear("drag", log, {GEAR: 0.0})
     assert found.effects[0].probability < 0.1
-    (words,) = (one for one in found.left_out if "gear" in one)
+    (words,) = (one for one in found.left_out if GEAR in one)
     assert words.startswith("With the gear down, and without drag, the model explains the record")
     assert f'set "{GEAR}" to 1.0' in words
 

@@ -47,15 +47,17 @@ def by_other_gear(case: Case, choice: Choice, records: Collection[Record]) -> Ot
     None if a record's manifest states the trim, or if the model has no gear that moves.
     """
     rig = None if any(map(states_trim, records)) else _with_other_gear(case.nominal)
-    if rig is None or case.timings or not _moves_gear(case, rig):
+    root, limits = choice.without_effects.rig, stage_limits(case.outputs)
+    before, limit = stage_gaps(case.outputs, root).get(AIRFRAME, 0.0), limits.get(AIRFRAME, FAR)
+    if rig is None or case.timings or before <= limit or not _moves_gear(case, rig):
         return None
-    root, other = choice.without_effects.rig, replace(case, nominal=rig)
+    other = replace(case, nominal=rig)
     error = Problem(case).model_error(root)
     best = evidence(Problem(case), choice.fit, error)
-    before, limit = stage_gaps(case.outputs, root)[AIRFRAME], stage_limits(case.outputs)[AIRFRAME]
     for removed, kept in _replaced(choice.fit.effects):
         fit = Problem(other).fit(kept, choice.fit.values)
-        if other.gaps(fit.rig)[AIRFRAME] > explained_below(before, limit):
+        # Its noise is not estimated: with the other gear the aircraft may not trim, and is far off.
+        if stage_gaps(case.outputs, fit.rig)[AIRFRAME] > explained_below(before, limit):
             continue
         found = evidence(Problem(other), fit, error)
         ahead = _ahead(replace(found, rest=found.rest - PRIOR_EFFECT), best)
