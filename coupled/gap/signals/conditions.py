@@ -56,15 +56,17 @@ def reach_of(record: Record, control: ControlName) -> float:
 def wrappers_of(record: Record, frame_s: float) -> list[Wrapper]:
     """Return the conditions of a record as wrappers of an aircraft.
 
-    Those of a log of another program are its first heading, and the levers that move.
+    Those of a log of another program include its first heading; levers that move are conditions
+    too, unless events of the manifest move them.
     """
     seed = record.manifest.get("seed")
     drawn = seed if isinstance(seed, int) else 0
-    acting = condition_wrappers(conditions_of(record), FILE, frame_s, drawn)
-    if "conditions" in record.manifest:
-        return acting
-    if HEADING in record:
+    known = conditions_of(record)
+    acting = condition_wrappers(known, FILE, frame_s, drawn)
+    if "conditions" not in record.manifest and HEADING in record:
         acting.append(Headed(float(record[HEADING][0])))
+    if known.event:  # which move the levers
+        return acting
     rate_Hz = (len(record) - 1) / float(record.time_s[-1] - record.time_s[0])
     levers = levers_of(record.channels)
     # A throttle at rest beside one that moves shows that each is that of an engine.

@@ -474,12 +474,12 @@ def _trim_output(model: Model, trim: Trim) -> Output:
     """Return the elevator position in trim as an output, with the noise of its channel.
 
     The trim is measured over a part of the rows, so the noise floor is higher than the noise. The
-    trim of the model has the error of the airspeed from which it is taken.
+    trim of the model has the error of the airspeed from which it is taken: the larger error counts.
     """
     position, at = model.record[surface_channel("column")], flown_by(model.rig).index("column")
     noise = position - smoothed(position)
     noise *= white(position) / max(float(np.std(noise)), 1e-12)
-    error = math.hypot(trim.error, trim_by_speed(model.rig, model.record, "column"))
+    error = max(trim.error, trim_by_speed(model.rig, model.record, "column"))
     floor = math.hypot(error * math.sqrt(len(position)), KNOWN)
 
     def predict(rig: Rig) -> Floats:
