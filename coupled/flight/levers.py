@@ -1,7 +1,8 @@
 """The levers of a recorded flight, which move the model's.
 
-The model's lever is moved from its position in trim as the recorded one is from its first position.
-One throttle of a record moves those of all engines; so do a mixture and a propeller lever.
+The model's lever is moved from its position in trim, as the recorded lever is from its first row.
+If a record has a single throttle, it moves the throttles of all engines; mixture and propeller
+levers likewise.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ Floats = NDArray[np.float64]
 class Levers(Wrapper):
     """The recorded positions of levers, shape (frames,) each, over the frames of a flight.
 
-    `frames` is how many frames of the record the model's step has, which need not be a whole one.
+    `frames` is the length of a step of the model in frames of the record; it may be a fraction.
     """
 
     def __init__(self, positions: Mapping[str, Floats], frames: float) -> None:

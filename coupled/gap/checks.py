@@ -502,9 +502,9 @@ def _measured_trim(rig: Rig, record: Record, file: str) -> dict[str, Any]:
 
 
 def _configuration(rig: Rig, record: Record, rows: int) -> dict[str, float]:
-    """Return the positions of flaps, gear and the like in the first rows, if not those of the rig.
+    """Return the positions of flaps, gear and the like in the first rows, if the rig has others.
 
-    By the model's properties, of those that the model has.
+    The keys are properties of the model; a lever that the model lacks is left out.
     """
     assert rig.flight is not None
     levers = {name: kind for name, (kind, _) in levers_of(record.channels).items()}

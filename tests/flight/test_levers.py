@@ -142,6 +142,13 @@ def test_a_lever_of_a_log_explains_the_motion_that_it_makes(
     assert max(gaps(alone(), Record(record.channels, still), {}).values()) > 5.0
 
 
+def test_a_lever_that_no_event_moves_is_as_recorded(tmp_path: Path) -> None:
+    """The conditions of a simulated flight are known, and may leave the throttle to the user."""
+    record = log(tmp_path, "fcs/throttle-cmd-norm", -0.6)
+    known = Record(record.channels, record.data, {"conditions": {}})
+    assert max(gaps(alone(), known, {}).values()) < 1.5
+
+
 def test_flaps_that_a_log_begins_with_are_those_of_the_trim(tmp_path: Path) -> None:
     flaps = "fcs/flap-cmd-norm"
     made, _ = flown(tmp_path, {}, 8.0, properties=(*PROPERTIES, flaps), before={flaps: 0.33})

@@ -7,7 +7,7 @@ curve contains no straight line. The effects found are therefore searched again 
 in the nominal rig. Their sizes and probabilities are those of this search. An effect that the
 search does not select was an approximation of the curve, and is not in the improved rig.
 
-The size of the closed form is that of a linear model, with a straight line beside it. If the form
+The size of the closed form is from a linear model with a straight line beside it. If the form
 without effects has more evidence at another size, all effects were approximations.
 """
 

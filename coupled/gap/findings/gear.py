@@ -33,7 +33,8 @@ GEAR = "gear/gear-cmd-norm"
 class OtherGear:
     """The other position of the gear in place of some effects, by their names.
 
-    `probability` is that of the effects if only the two are possible, `words` is a sentence.
+    `probability` is the effects' probability if only they and the gear are possible, `words` a
+    sentence for the summary.
     """
 
     effects: frozenset[str]

@@ -47,7 +47,7 @@ def _search_with_drift(
 ) -> tuple[Case, Choice] | None:
     """Repeat the search with an effect that grows from the start, as likely as a sensor's drift.
 
-    None if no sensor drifts, or if its drift is far likelier than that of any other effect.
+    None if no sensor drifts, or if its drift is far likelier than growth of any other effect.
     """
     others = tuple(effect for effect in found.fit.effects if not effect.gradual)
     shown = {o for effect in found.fit.effects if effect.gradual for o in effect.shows_in}

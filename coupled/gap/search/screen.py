@@ -194,7 +194,7 @@ class Screen:
     def _screened(
         self, current: Fit, effect: Effect, counts: Floats, refitted: bool = False
     ) -> Screened:
-        """Return a candidate with the best start of each shape, that of least residual first.
+        """Return a candidate with the best start of each shape, least residual first.
 
         `refitted`: the parameters of the current effects change with it, and its gain is that of
         its effective samples without it and them.

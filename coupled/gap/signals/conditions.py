@@ -56,8 +56,8 @@ def reach_of(record: Record, control: ControlName) -> float:
 def wrappers_of(record: Record, frame_s: float) -> list[Wrapper]:
     """Return the conditions of a record as wrappers of an aircraft.
 
-    Those of a log of another program include its first heading; levers that move are conditions
-    too, unless events of the manifest move them.
+    A log of another program also has a first heading. Recorded levers that move are conditions too,
+    unless the manifest has events, which move them.
     """
     seed = record.manifest.get("seed")
     drawn = seed if isinstance(seed, int) else 0
@@ -69,7 +69,7 @@ def wrappers_of(record: Record, frame_s: float) -> list[Wrapper]:
         return acting
     rate_Hz = (len(record) - 1) / float(record.time_s[-1] - record.time_s[0])
     levers = levers_of(record.channels)
-    # A throttle at rest beside one that moves shows that each is that of an engine.
+    # If one throttle moves and another rests, each drives its own engine.
     kinds = {kind for name, (kind, _) in levers.items() if np.ptp(record[name]) > 0.0}
     rows = max(2, round(BRIEF_s * rate_Hz))
     moved = {n: _from_rest(record[n], rows) for n, (kind, _) in levers.items() if kind in kinds}

@@ -474,7 +474,8 @@ def _trim_output(model: Model, trim: Trim) -> Output:
     """Return the elevator position in trim as an output, with the noise of its channel.
 
     The trim is measured over a part of the rows, so the noise floor is higher than the noise. The
-    trim of the model has the error of the airspeed from which it is taken: the larger error counts.
+    model's trim has the error of the measured airspeed. The larger of the two errors is used: their
+    sum of squares hides a wrong elevator moment (`test_motion_zeros`).
     """
     position, at = model.record[surface_channel("column")], flown_by(model.rig).index("column")
     noise = position - smoothed(position)

@@ -307,9 +307,9 @@ def trim_of(rig: Rig, record: Record, control: ControlName) -> Trim | None:
 
 
 def trim_by_speed(rig: Rig, record: Record, control: ControlName) -> float:
-    """Return the standard error of a surface's trim by that of the measured airspeed, rad.
+    """Return the standard error of a surface's trim due to the measured airspeed, rad.
 
-    0 if the trim is not measured, but that of the manifest or of the rig file.
+    0 if the trim is taken from the manifest or the rig file.
     """
     speed = "true_airspeed_m_per_s"
     if speed not in record or states_trim(record) or rig.flight is None:
@@ -328,7 +328,7 @@ def trim_by_speed(rig: Rig, record: Record, control: ControlName) -> float:
 def states_trim(record: Record) -> bool:
     """Tell whether a record's manifest states the trim that was flown.
 
-    The rig of an imported log is the one that the log was compared with.
+    The manifest of an imported log has a rig with which the log was compared, not flown.
     """
     table = record.manifest.get("rig")
     flown = isinstance(table, Mapping) and isinstance(table.get("flight"), Mapping)
