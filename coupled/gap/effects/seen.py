@@ -3,7 +3,8 @@
 A ripple is a force proportional to sin or cos of 2π·δc/period. It moves δc by the loader's
 equation, m·r'' + c·r' + G·r = −F. The residual is regressed on this response for many periods, as
 in a spectrum over the deflection instead of time. The regression is in δc, where the noise is
-white; in the force, the equation would amplify noise at short periods.
+white; in the force, the equation would amplify noise at short periods. Under an imposed motion the
+residual is a force, and is the ripple itself.
 
 The bend of a lightly damped structure is linear in its coefficient, but nearly all of it is within
 its bandwidth, a share 2ζ of its frequency. The residual of a rigid structure is therefore regressed
@@ -53,12 +54,11 @@ def hums(outputs: Sequence[Output], rig: Rig, control: ControlName) -> list[dict
 
 def ripples(outputs: Sequence[Output], rig: Rig, control: ControlName) -> list[dict[str, float]]:
     """Return amplitude, N, period, d, and phase, rad, of the strongest ripples, strongest first."""
-    ours = [
-        output for output in outputs if output.stage == "loader" and "force" not in output.channel
-    ]
+    ours = [output for output in outputs if output.stage == "loader"]
+    ours = [o for o in ours if "force" not in o.channel or o.imposed is not None]  # not F_mod
     if not ours:
         return []
-    ways = [smoothed(output.measured) for output in ours]
+    ways = [smoothed(o.measured if o.imposed is None else o.imposed) for o in ours]
     answers = [_answer(output, rig, control) for output in ours]
 
     def moved(forces: Sequence[Floats] | Sequence[Complex]) -> Complex:
@@ -94,7 +94,12 @@ def _wave(both: Floats, left: Floats, period: float) -> tuple[dict[str, float], 
 
 
 def _answer(output: Output, rig: Rig, control: ControlName) -> Complex:
-    """Return the loader's frequency response to a friction force, d/N."""
+    """Return the loader's frequency response to a friction force, d/N.
+
+    Under an imposed motion the output is the hand's force, which carries the friction: 1.
+    """
+    if output.imposed is not None:
+        return np.ones(len(output.measured), dtype=np.complex128)
     data = rig.controls[control]
     turns = 2.0 * np.pi * np.fft.fftfreq(len(output.measured), 1.0 / output.frame_rate_Hz)
     gradient = float(np.mean(data.schedule.gradients))

@@ -132,6 +132,7 @@ class Output:
     in_series  predicted from the force by loader and linkage in series
     shots      prediction by multiple shooting: short replays, restarted as measured
     handed_on  part of the measurement that comes from the input; the rest is the stage's own motion
+    imposed    the imposed motion as read, d, of a force that answers it
     errors     samples of the propagated error of the input; of one number in all of a record's
     lasts      autocorrelation time of the noise floor, frames, if its residual may not show it
     """
@@ -155,6 +156,7 @@ class Output:
     in_series: bool = False
     shots: Predict | None = field(default=None, repr=False, compare=False)
     handed_on: Floats | None = field(default=None, repr=False, compare=False)
+    imposed: Floats | None = field(default=None, repr=False, compare=False)
     errors: Sequence[Floats] = field(default=(), repr=False, compare=False)
     lasts: float = 1.0
     _known: list[tuple[Any, Floats]] = field(default_factory=list, repr=False, compare=False)

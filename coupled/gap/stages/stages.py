@@ -319,7 +319,8 @@ class Reader(Reading):
         force, (predict, noisy, judged) = self.signal("force"), under_motion(self)
         own = min(self.driving("force"), between_jumps(force), key=lambda one: one.rms)  # backlash
         given = ("loader", "force", predict, noisy, own, self.imposed)
-        return [self._made(*given, judged=judged)]
+        made = self._made(*given, judged=judged)
+        return [replace(made, imposed=self.signal(self.imposed))]
 
     def _product(self, read: Floats, rig: Rig | None = None) -> Floats:
         """Return F_mod by δc as read, by this rig or another one."""
