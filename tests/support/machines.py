@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 from scipy.linalg import expm
+from scipy.signal import lfilter
 
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
@@ -269,13 +270,17 @@ def sprung_rig(rate_Hz: float = 100.0) -> Rig:
 MOTOR_kg, MOTOR_DAMPING, MOTOR_DRY_N = 1.2e-4, 1.4e-4, 0.03
 
 
-def slider(seed: int, factor: float = 1.0, noise_m: float = 2e-3) -> Record:
+def slider(seed: int, factor: float = 1.0, noise_m: float = 2e-3, memory: float = 0.0) -> Record:
     """Return 20 s of a mass of 1 kg with damping, pushed one way by steps of force, at 50 Hz.
 
-    m·x'' + c·x' = F, c = `factor` · 0.6 N·s/m, in closed form over each frame.
+    m·x'' + c·x' = F, c = `factor` · 0.6 N·s/m, in closed form over each frame. With a `memory` the
+    force is white noise behind a lag, held for a frame.
     """
     rng, rate_Hz, frames, damping = np.random.default_rng(seed), 50.0, 1000, 0.6 * factor
     force = 0.6 + np.repeat(rng.uniform(0.0, 1.4, 20), 50)
+    if memory:
+        white = 0.4 * math.sqrt(1.0 - memory**2) * rng.normal(size=frames)
+        force = 1.3 + lfilter([1.0], [1.0, -memory], white)
     kept = np.exp(-damping / rate_Hz)
     speed, way = 0.0, np.zeros(frames)
     for k, pull in enumerate(force[:-1].tolist()):

@@ -16,7 +16,7 @@ from typing import Any, Self
 import numpy as np
 
 from coupled.gap.noise.lines import projected
-from coupled.gap.noise.noise import Noise, noise_of, noise_of_input
+from coupled.gap.noise.noise import Noise, between_jumps, jumps, noise_of, noise_of_input
 from coupled.gap.noise.smooth import smoothed
 from coupled.gap.signals.floors import Drive, floor_from, noise_in
 from coupled.gap.signals.live import Assumed, Live, Mask, live_of
@@ -384,10 +384,16 @@ class Reading:
         return noise_in(self.rig, name, self._quiet(name))
 
     def driving(self, quantity: str) -> Noise:
-        """Return the noise of a control's channel as an input, without a broadband signal."""
+        """Return the noise of a control's channel as an input, without a broadband signal.
+
+        Of a signal that jumps often, as a torque held in steps, it is that between the jumps.
+        """
         estimated, signal = self.channel_noise(quantity), self._quiet(self.name_of(quantity))
         found = None if estimated.filtered else noise_of_input(signal)
-        return estimated if found is None else above_rounding(found, signal)
+        known = [estimated if found is None else above_rounding(found, signal)]
+        if jumps(signal):
+            known.append(above_rounding(between_jumps(signal), signal))
+        return min(known, key=lambda one: one.rms)
 
     def filtered(self) -> dict[str, str]:
         """Return {filtered channel of the control: source of its noise floor}."""

@@ -22,7 +22,7 @@ from functools import cached_property, partial
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.gap.noise.noise import Noise, between_jumps, rms_of
+from coupled.gap.noise.noise import Noise, rms_of
 from coupled.gap.noise.smooth import Smoother, rate_of, smoothed
 from coupled.gap.signals.conditions import reach_of, trim_shift
 from coupled.gap.signals.floors import (
@@ -316,9 +316,8 @@ class Reader(Reading):
 
     def _answering(self) -> list[Output]:
         """Return the force as the output under an imposed motion."""
-        force, (predict, noisy, judged) = self.signal("force"), under_motion(self)
-        own = min(self.driving("force"), between_jumps(force), key=lambda one: one.rms)  # backlash
-        given = ("loader", "force", predict, noisy, own, self.imposed)
+        predict, noisy, judged = under_motion(self)
+        given = ("loader", "force", predict, noisy, self.driving("force"), self.imposed)
         made = self._made(*given, judged=judged)
         return [replace(made, imposed=self.signal(self.imposed))]
 
