@@ -135,6 +135,14 @@ def test_a_damping_is_found_under_a_force_in_steps() -> None:
     assert damping.value == pytest.approx(1.5, rel=0.02)
 
 
+def test_noise_that_hides_a_damping_between_restarts_is_no_proof_of_health() -> None:
+    """The floor was compared with the whole travel, of which a short replay predicts little."""
+    found = diagnose(slider_rig(), {"r": hissing(2.0, 1.3)})
+    stage = found.stage("loader").as_dict()
+    assert (found.verdict, stage["judged"]) == ("ambiguous", False)
+    assert 0.15 < stage["floor_share"] < 0.35
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("noise_N", [0.0, 0.1])
 @pytest.mark.parametrize("factor", [1.1, 1.4])

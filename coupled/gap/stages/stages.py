@@ -241,10 +241,12 @@ class Reader(Reading):
             return predicted(driven(force.with_error(k), seen), 2.0**0.5)(rig)
 
         force = self._without_answered_noise(force, computed)
-        own_starts = self._restarts()
+        own_starts, moves = self._restarts(), 0.0
         if restarted:
-            own_starts = self._restarts_that_show(
-                lambda f, starts: driven(f, smooth, starts)(self.rig, 0.0), force.smooth, own.rms
+            own_starts, moves = self._restarts_that_show(
+                lambda *given: driven(given[0], smooth, *given[1:])(self.rig, 0.0),
+                force.smooth,
+                own.rms,
             )
         trembling = Nodes(force.passed(np.random.default_rng(47)))
         answer = driven(force.smooth, smooth)
@@ -253,25 +255,29 @@ class Reader(Reading):
         otherwise = driven(force.smooth, smooth, otherwise=True)(self.rig, 0.0)
         given = ("force", rms_of(otherwise - answer(self.rig, 0.0)), self.judged)
         whole = self._made("loader", "computed", predicted(answer), noisy, own, *given)
-        whole = whole.under(force.noise)
+        whole = _between_restarts(whole.under(force.noise), moves)
         if not restarted:
             every = self._restarts(round(PIECE_s * self.rig.frame_rate))
             whole = replace(whole, shots=plain(driven(force.smooth, smooth, every)))
         return [replace(whole, rough=plain(answer)) if walks else whole]
 
     def _restarts_that_show(
-        self, moved: Callable[[Floats, Mask], Floats], force: Floats, noise: float
-    ) -> Mask:
+        self, moved: Callable[[Floats, Mask, bool], Floats], force: Floats, noise: float
+    ) -> tuple[Mask, float]:
         """Return restarts so far apart that a tenth more force shows beyond the noise.
 
-        A slow machine that is restarted often follows any record, whatever its damping.
+        The noise includes the error of the force between frames. A slow machine that is restarted
+        often follows any record, whatever its damping. The second number is the rms motion that
+        the force causes between the restarts, d.
         """
-        for times in (1, 2, 4):
-            starts = self._restarts(round(times * PIECE_s * self.rig.frame_rate))
-            more = moved((1.0 + SMALL) * force, starts) - moved(force, starts)
-            if rms_of(more) > SIGMAS * noise:
-                return starts
-        return self._restarts(round(STRETCH_s * self.rig.frame_rate))
+        for every_s in (PIECE_s, 2.0 * PIECE_s, 4.0 * PIECE_s, STRETCH_s):
+            starts = self._restarts(round(every_s * self.rig.frame_rate))
+            usual = moved(force, starts, False)
+            more = rms_of(moved((1.0 + SMALL) * force, starts, False) - usual)
+            between = rms_of(moved(force, starts, True) - usual)
+            if more > SIGMAS * math.hypot(noise, between):
+                break
+        return starts, more / SMALL
 
     def _restarts(self, every: int = 0) -> Mask:
         """Return the frames at which a replay restarts as measured; also every `every` frames."""
@@ -471,6 +477,17 @@ class Reader(Reading):
         own = left_noise(estimate_noise(left), measured, left)
         floor = float(np.hypot(own.rms, KNOWN * np.ptp(measured)))
         return [self._output("surface", surface, measured, predict, floor)]
+
+
+def _between_restarts(output: Output, moves: float) -> Output:
+    """Return an output whose floor is compared with the motion `moves`, rms, between restarts.
+
+    The motion over the whole record is far larger than that which a short replay predicts. 0: there
+    are no restarts.
+    """
+    if output.hidden_gap is None or moves <= 0.0:
+        return output
+    return replace(output, hidden_gap=replace(output.hidden_gap, share=output.floor / moves))
 
 
 def _with_motion(computed: Floats, smooth: Floats, level: Noise) -> Floats:
