@@ -35,6 +35,7 @@ from coupled.gap.findings.gear import by_other_gear
 from coupled.gap.findings.healthy import Baseline, beside_healthy
 from coupled.gap.findings.hints import late_channels, still_surfaces, unknown_levers
 from coupled.gap.findings.judge import Judge
+from coupled.gap.findings.onefunction import by_one_function, needs_a_function
 from coupled.gap.findings.result import EffectResult, StageResult, Verdict
 from coupled.gap.findings.surfaceunit import in_other_unit
 from coupled.gap.findings.where import lone_channel
@@ -48,7 +49,7 @@ from coupled.gap.signals.output import Floats, estimate_noise
 from coupled.gap.signals.reading import Reading
 from coupled.gap.stages.airframe import needs
 from coupled.gap.stages.surfaces import surface_points
-from coupled.gap.stages.tried import TERMS_OPTION, untried_terms
+from coupled.gap.stages.tried import TERMS_OPTION, functions_tried, tried_effects, untried_terms
 from coupled.gap.thresholds import DOUBLED, MOST, TINY
 from coupled.parallel import in_threads, threads
 from coupled.record.channels import CONTROL_NAMES, ControlName, channel
@@ -231,7 +232,8 @@ def findings(prepared: Prepared, case: Case, choice: Choice) -> PartDiagnosis:
     """Return the diagnosis from a search; `case` has the final noise floors."""
     part, readers, baseline = prepared.part, prepared.readers, prepared.baseline
     outputs, records = list(case.outputs), [reader.record for reader in readers]
-    judged, curves, beside = _judged(prepared, case, choice), None, None
+    choice, judged = _with_function(prepared, case, choice)
+    curves, beside = None, None
     if part.own and judged.verdict != "no_gap":
         curves = find_curves(case, choice, judged.effects, records)
     if curves is not None:
@@ -325,6 +327,18 @@ def _judged(
     budgets = [stage_budget(name, case, root, choice.fit, floors) for name in faulty]
     budget = tuple(one for one in budgets if one is not None)
     return _Judged(judge, stages, effects, budget, verdict_of(choice, stages, effects, budget))
+
+
+def _with_function(prepared: Prepared, case: Case, choice: Choice) -> tuple[Choice, _Judged]:
+    """Return a choice, or that of one function of the aircraft's model if it is likelier."""
+    judged = _judged(prepared, case, choice)
+    tried = any(effect.of for effect in prepared.library)
+    if tried or not needs_a_function(case, choice, judged.effects):
+        return choice, judged
+    functions = functions_tried(case.nominal, [reader.record for reader in prepared.readers])
+    shown = tried_effects(functions, prepared.readers, case.outputs)
+    other = by_one_function(case, choice, shown)
+    return (choice, judged) if other is None else (other, _judged(prepared, case, other))
 
 
 def _as_stamped(rig: Rig, filed: Rig, effects: Sequence[EffectResult]) -> Rig:

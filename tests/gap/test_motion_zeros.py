@@ -134,12 +134,15 @@ def test_a_zero_of_a_sensor_is_found_as_such(healthy: Record, name: str) -> None
 
 
 @pytest.mark.slow
-def test_a_wrong_elevator_moment_from_neutral_is_a_factor_and_a_constant(tmp_path: Path) -> None:
-    """The factor of the effect counts from trim; the rest is a constant pitching moment."""
+def test_a_wrong_elevator_moment_from_neutral_is_that_function(tmp_path: Path) -> None:
+    """The factor of the effect counts from trim, so it needs a constant pitching moment beside."""
     log, _ = flown(tmp_path, {"/Cmde": 0.9}, 16.0, controls=1)
     found = diagnose(alone(), {"log": noisy(import_log(log)[0])})
-    assert {one.name for one in found.effects} == {"elevator_effectiveness", "pitching_moment"}
-    assert found.verdict in ("effect", "mostly")
+    (effect,) = found.effects
+    (factor,) = effect.parameters
+    assert (found.verdict, effect.of) == ("effect", "aero/coefficient/Cmde")
+    assert factor.low is not None and factor.high is not None
+    assert factor.low < 0.9 < factor.high < factor.low + 0.1
 
 
 def test_what_remains_of_the_motion_counts_in_full_against_a_zero(healthy: Record) -> None:

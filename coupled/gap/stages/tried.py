@@ -265,28 +265,38 @@ def with_terms(library: Sequence[Effect], rig: Rig, records: Mapping[str, Record
     Raises InputError without named functions, or without channels that the airframe needs.
     """
     assert rig.flight is not None
-    axes = functions_of(main_file(rig.flight, [aircraft_folder()], rig.place))
-    if not axes:
+    if not _axes_of(rig):
         problem = f"{rig.flight.model} has no named aerodynamic functions; leave it out"
         raise InputError(rig.place, TERMS_OPTION, problem)
-    large = set[str]()
     for file, record in records.items():
         lacking = [name for name in needs(rig, record) if name not in record]
         if lacking:
             problem = f"the record lacks {', '.join(lacking)}, which the airframe needs"
             raise InputError(file, TERMS_OPTION, problem)
-        large |= large_terms(rig, record, axes)
     kept = [one for one in library if not _AERODYNAMIC & keys_of([one])]
-    return [*kept, *(term(name, axis) for name, axis in axes.items() if name in large)]
+    return [*kept, *functions_tried(rig, list(records.values()))]
+
+
+def functions_tried(rig: Rig, records: Collection[Record]) -> list[Effect]:
+    """Return factors on the functions of the model's aerodynamics that records show."""
+    axes = _axes_of(rig)
+    shown = [one for one in records if all(name in one for name in needs(rig, one))]
+    large = {name for one in shown for name in large_terms(rig, one, axes)} if axes else set[str]()
+    return [term(name, axis) for name, axis in axes.items() if name in large]
+
+
+def _axes_of(rig: Rig) -> dict[str, str]:
+    """Return the axis of each named function of a rig's model; empty without an aircraft."""
+    if rig.flight is None:
+        return {}
+    return functions_of(main_file(rig.flight, [aircraft_folder()], rig.place))
 
 
 def untried_terms(library: Sequence[Effect], rig: Rig) -> str:
     """Return a sentence on the model's functions, if it has some and a library lacks them."""
-    if rig.flight is None or any(effect.of for effect in library):
+    if any(effect.of for effect in library) or not _axes_of(rig):
         return ""
-    if not functions_of(main_file(rig.flight, [aircraft_folder()], rig.place)):
-        return ""
-    return f"Not tried: factors on the model's own aerodynamic functions ({TERMS_OPTION})."
+    return f"Not tried: factors on several of the model's own functions at once ({TERMS_OPTION})."
 
 
 def large_terms(rig: Rig, record: Record, axes: Mapping[str, str]) -> set[str]:
