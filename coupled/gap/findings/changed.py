@@ -52,9 +52,10 @@ from coupled.rig.rig import Rig
 SIDES = ((1, "positive"), (-1, "negative"))
 # The levels of motion in both directions: a and a₀. A motion in one has a mean only.
 LEVEL, MIDDLE = "half difference of the directions", "mean of both directions"
-LEVELS = (LEVEL, *(f"mean in {direction} direction" for _, direction in SIDES))
+ONE_WAY = tuple(f"mean in {direction} direction" for _, direction in SIDES)
+LEVELS = (LEVEL, MIDDLE, *ONE_WAY)
 SLOPES = ("slope over the speed", "slope over the place", "slope over the acceleration")
-FIRST = (*LEVELS, SLOPES[0])
+FIRST = (LEVEL, *ONE_WAY, SLOPES[0])
 LINEAR = ("half", "mean", "slope")
 
 
@@ -145,8 +146,8 @@ class Change:
 class Comparison:
     """All features of some records tested against healthy ones.
 
-    `shown` is the change of a mean in each stage, relative to the rms of its channel, that would
-    have been shown: of the signal and the direction in which the test is most sensitive.
+    `shown` is the change of friction or offset in each stage, relative to the rms of its channel,
+    that would have been shown: of the one that is harder to detect, in the more sensitive signal.
     """
 
     healthy: int
@@ -184,8 +185,8 @@ class Comparison:
             )
         each = ", ".join(f"{100.0 * size:.2g} % in the {name}" for name, size in seen.items())
         return (
-            f"By the scatter between {self.healthy} healthy records, a change of a mean is"
-            f" detectable from these shares of the signal's rms: {each}."
+            f"By the scatter between {self.healthy} healthy records, a change of friction or"
+            f" offset is detectable from these shares of the signal's rms: {each}."
         )
 
     def as_dict(self) -> dict[str, Any]:
@@ -262,7 +263,7 @@ def compare(
         and feature in FIRST
     }
     others = pairs - first
-    found, shown = [], dict[str, float]()
+    found, levels = [], dict[str, dict[str, float]]()
     for name, each in features.items():
         ours = [one[name] for one in healthy]
         excess = _excess([one.moved for one in ours], [one[name].moved for one in tested])
@@ -280,7 +281,9 @@ def compare(
             interval = Interval.of(*values, chance, more, least, beyond)
             found.append(Change(stage, name, feature, interval))
             if feature in LEVELS and channel_rms > 0.0:
-                shown[stage] = min(shown.get(stage, math.inf), interval.shown / channel_rms)
+                known, size_shown = levels.setdefault(stage, {}), interval.shown / channel_rms
+                known[feature] = min(known.get(feature, math.inf), size_shown)
+    shown = {stage: max(known.values()) for stage, known in levels.items()}
     return Comparison(len(healthy), tuple(found), shown)
 
 
