@@ -251,7 +251,7 @@ def findings(prepared: Prepared, case: Case, choice: Choice) -> PartDiagnosis:
     unknown = unmeasured_trim(case.nominal, prepared.records) if AIRFRAME in faulty else ""
     change = None
     if baseline is not None:
-        change = baseline.compared(prepared.records, prepared.case.outputs, part.own)
+        change = baseline.compared(prepared.records, prepared.case, part.own)
     gear = by_other_gear(case, choice, records) if verdict != "no_gap" else None
     units = in_other_unit(case.nominal, effects)
     shares = {one.name: MOST for one in effects if prepared.is_otherwise(one)}
@@ -269,7 +269,9 @@ def findings(prepared: Prepared, case: Case, choice: Choice) -> PartDiagnosis:
         hints += [*of_channels, unknown_levers(records) if AIRFRAME in faulty else ""]
         if AIRFRAME in faulty and not any(of_channels):
             hints.append(untried_terms(prepared.library, case.nominal))
-    verdict, stages = beside_healthy(verdict, stages, baseline, change)
+    if baseline is not None:
+        others = baseline.compared(prepared.records, prepared.case, part.own, fit)
+        verdict, stages = beside_healthy(verdict, stages, fit.effects, baseline.assumed, others)
     filtered = (one.filtered().items() for one in readers) if part.own else ()
     return PartDiagnosis(
         part=part,

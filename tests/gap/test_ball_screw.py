@@ -67,15 +67,15 @@ def test_friction_and_damping_that_changed_are_told_from_the_scatter_of_the_heal
     """By features alone. Friction scatters by 4 % when it is well, damping by 6 %."""
     rig = ball_screw_rig()
 
-    def known(records: list[Record]) -> tuple[list[Record], list[Output]]:
+    def known(records: list[Record]) -> tuple[list[Record], list[Output], Rig]:
         files = {str(i): one for i, one in enumerate(records)}
         readers = readers_of(dict.fromkeys(files, rig), files, "column")
-        return records, [output for reader in readers for output in reader.outputs()]
+        return records, [output for reader in readers for output in reader.outputs()], rig
 
     well = known([ball_screw(1000 + seed) for seed in range(12)])
 
     def changed(record: Record) -> set[str]:
-        found = compare(rig, "column", well, known([record]))
+        found = compare("column", well, known([record]))
         return {one.feature for one in found.changed}
 
     assert sum(bool(changed(ball_screw(2000 + seed))) for seed in range(8)) <= 1

@@ -10,7 +10,10 @@ import pytest
 from scipy import stats
 
 from coupled.gap.diagnose import diagnose
+from coupled.gap.effects.library import BY_NAME
 from coupled.gap.findings.changed import Comparison, Interval, compare
+from coupled.gap.findings.healthy import beside_healthy
+from coupled.gap.findings.result import StageResult
 from coupled.gap.signals.output import Output
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points
@@ -102,8 +105,9 @@ def outputs_of(records: Sequence[Record]) -> list[Output]:
 
 
 def compared(well: Sequence[Record], now: Sequence[Record]) -> Comparison:
-    known = well, outputs_of_the_well() if well is WELL else outputs_of(well)
-    return compare(screw_rig(), "column", known, (now, outputs_of(now)))
+    known = outputs_of_the_well() if well is WELL else outputs_of(well)
+    rig = screw_rig()
+    return compare("column", (well, known, rig), (now, outputs_of(now), rig))
 
 
 WELL = [screw(day) for day in range(8)]
@@ -158,6 +162,20 @@ def test_an_offset_that_the_scatter_hides_is_not_said_to_be_detectable() -> None
     assert found.changed == ()
     assert found.shown["loader"] > 40.0 / 70.0
     assert found.blind == {"loader"}
+
+
+@pytest.mark.parametrize(
+    ("effect", "faulty"), [("deflection_zero", {"sensing", "loader"}), ("force_zero", {"sensing"})]
+)
+def test_a_changed_stage_is_faulty_beside_an_effect_that_does_not_show_in_it(
+    effect: str, faulty: set[str]
+) -> None:
+    """Friction has doubled; a zero of δ does not show in the loader, one of the force does."""
+    change = compared(WELL, [screw(60, friction=2.0)])
+    stages = StageResult("loader", gap=1.0), StageResult("sensing", gap=9.0, guilty=True)
+    verdict, known = beside_healthy("effect", stages, [BY_NAME[effect]], frozenset(), change)
+    assert {stage.name for stage in known if stage.guilty} == faulty
+    assert verdict == ("unexplained" if "loader" in faulty else "effect")
 
 
 def test_two_healthy_records_show_no_change_of_a_tenth() -> None:

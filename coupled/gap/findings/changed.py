@@ -238,20 +238,15 @@ class _Signal:
 
 
 Signals = Sequence[Mapping[str, _Signal]]
+Judged = tuple[Sequence[Record], Sequence[Output], Rig]  # records, their outputs, predicted by rig
 
 
-def compare(
-    rig: Rig,
-    control: ControlName,
-    well: tuple[Sequence[Record], Sequence[Output]],
-    now: tuple[Sequence[Record], Sequence[Output]],
-    force: bool = True,
-) -> Comparison:
-    """Return records tested against healthy ones, each with the outputs that they let judge.
+def compare(control: ControlName, well: Judged, now: Judged, force: bool = True) -> Comparison:
+    """Return records tested against healthy ones.
 
-    The predictions of `rig` are subtracted. The `force` on the control is tested too.
+    The predictions of each one's rig are subtracted. The `force` on the control is tested too.
     """
-    healthy, tested = (_signals(rig, control, *each, force) for each in (well, now))
+    healthy, tested = (_signals(control, *each, force) for each in (well, now))
     pull = channel(control, "force")
     names = [name for name in healthy[0] if all(name in one for one in (*healthy, *tested))]
     features = {name: _features(healthy, tested, name) for name in names}
@@ -288,10 +283,10 @@ def compare(
 
 
 def _signals(
-    rig: Rig,
     control: ControlName,
     records: Sequence[Record],
     outputs: Sequence[Output],
+    rig: Rig,
     with_force: bool,
 ) -> Signals:
     """Return each record's signals by name: the force, and the residual of each output."""

@@ -21,7 +21,8 @@ from typing import Any
 import numpy as np
 
 from coupled.display import unit_in
-from coupled.gap.effects.effect import Effect
+from coupled.gap.chain import stage_of
+from coupled.gap.effects.effect import Effect, possible
 from coupled.gap.effects.settings import ALONE
 from coupled.gap.findings.budget import by_stretch
 from coupled.gap.findings.changed import Comparison, compare
@@ -168,14 +169,15 @@ class Baseline:
         return cls(records, case, rig, found.effects, errors)
 
     def compared(
-        self, records: Mapping[str, Record], outputs: Sequence[Output], force: bool
+        self, records: Mapping[str, Record], case: Case, force: bool, found: Fit | None = None
     ) -> Comparison:
-        """Return records, with their outputs, tested against the healthy ones (`compare`)."""
-        well, now = (
-            (list(self.records.values()), self.case.outputs),
-            (list(records.values()), outputs),
-        )
-        return compare(self.case.nominal, self.case.control, well, now, force)
+        """Return records tested against the healthy ones, without what effects found do."""
+        rig = now = self.case.nominal
+        if found is not None and found.effects:
+            rig = case.nominal  # to which the effects were fitted
+            now = possible(rig, case.control, found.effects, found.values) or rig
+        well = list(self.records.values()), self.case.outputs, rig
+        return compare(self.case.control, well, (list(records.values()), case.outputs, now), force)
 
     def raised(self, outputs: Sequence[Output]) -> list[Output]:
         """Return outputs with the model error in their noise floors, where it is known."""
@@ -228,22 +230,26 @@ class Baseline:
 def beside_healthy(
     verdict: Verdict,
     stages: tuple[StageResult, ...],
-    baseline: Baseline | None,
-    change: Comparison | None,
+    effects: Sequence[Effect],
+    assumed: frozenset[str],
+    change: Comparison,
 ) -> tuple[Verdict, tuple[StageResult, ...]]:
     """Return the verdict and the stages with what a comparison with healthy records shows.
 
-    A stage that changed without an effect for it is faulty. A stage whose floor hides a gap is
-    judged by the comparison instead. No verdict is given where neither the comparison nor noise
-    would have shown a change of a tenth.
+    `change` is that of the record beside its `effects`, `assumed` as in `Baseline`. A stage that
+    changed is faulty, unless it is one in which an effect or an unexplained fault shows. A stage
+    whose floor hides a gap is judged by the comparison instead. No verdict is given where neither
+    the comparison nor noise would have shown a change of a tenth.
     """
-    decided = verdict not in ("no_gap", "ambiguous") or any(stage.guilty for stage in stages)
-    if decided or baseline is None or change is None:
+    known = {stage.name for stage in stages if stage.guilty}
+    known |= {stage_of(output) for effect in effects for output in effect.shows_in}
+    if known and not effects:
         return verdict, stages
-    if change.changed:
-        faulty = set(change.stages[:1])
-        known = [replace(one, guilty=one.guilty or one.name in faulty) for one in stages]
-        return "unexplained", tuple(known)
+    if changed := [name for name in change.stages if name not in known]:
+        found = [replace(one, guilty=one.guilty or one.name == changed[0]) for one in stages]
+        return "unexplained", tuple(found)
+    if known or verdict not in ("no_gap", "ambiguous"):
+        return verdict, stages
     hidden = {stage.name for stage in stages if stage.hidden is not None}
-    open_ones = (hidden | baseline.assumed) & change.blind | (hidden - change.shown.keys())
+    open_ones = (hidden | assumed) & change.blind | (hidden - change.shown.keys())
     return "ambiguous" if open_ones else "no_gap", stages
