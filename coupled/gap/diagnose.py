@@ -29,7 +29,7 @@ from coupled.gap.effects.library import MOTION
 from coupled.gap.findings.answer import effects_of, incredible, settings_of, verdict_of
 from coupled.gap.findings.beside import beside_closed_form
 from coupled.gap.findings.budget import StageBudget, floors_of, shrink, stage_budget
-from coupled.gap.findings.curves import find_curves
+from coupled.gap.findings.curves import Curves, find_curves
 from coupled.gap.findings.diagnosis import Diagnosis, PartDiagnosis, WholeDiagnosis
 from coupled.gap.findings.gear import by_other_gear
 from coupled.gap.findings.healthy import Baseline, beside_healthy
@@ -42,7 +42,7 @@ from coupled.gap.findings.where import lone_channel
 from coupled.gap.prepare import Prepared, prepare
 from coupled.gap.search.case import Case, Tell
 from coupled.gap.search.descent import Descent
-from coupled.gap.search.found import Choice, inseparable
+from coupled.gap.search.found import Choice, Fit, inseparable
 from coupled.gap.search.histories import search
 from coupled.gap.search.problem import Problem
 from coupled.gap.signals.output import Floats, estimate_noise
@@ -231,45 +231,14 @@ def _told(tell: Tell | None, part: Part, parts: Collection[Part]) -> Tell | None
 def findings(prepared: Prepared, case: Case, choice: Choice) -> PartDiagnosis:
     """Return the diagnosis from a search; `case` has the final noise floors."""
     part, readers, baseline = prepared.part, prepared.readers, prepared.baseline
-    outputs, records = list(case.outputs), [reader.record for reader in readers]
-    choice, judged = _with_function(prepared, case, choice)
-    curves, beside = None, None
-    if part.own and judged.verdict != "no_gap":
-        curves = find_curves(case, choice, judged.effects, records)
-    if curves is not None:
-        beside = beside_closed_form(judged.judge, case, judged.effects, curves)
-        effects = tuple(map(curves.probable, judged.effects))
-        if beside is not None:
-            choice, curves, effects = beside.choice, beside.curves, beside.effects
-        judged = _judged(prepared, case, choice, effects)
-    fit, stages, effects, verdict = choice.fit, judged.stages, judged.effects, judged.verdict
-    fitted = Problem(case).fit(fit.effects, fit.values, descent=Descent("own"), part="fitted")
-    if beside is not None:
-        fitted = beside.fitted
-    floors = floors_of(case, choice)
-    faulty = [stage.name for stage in stages if stage.guilty]
-    unknown = unmeasured_trim(case.nominal, prepared.records) if AIRFRAME in faulty else ""
+    outputs = list(case.outputs)
+    answer = _answer(prepared, case, choice)
+    choice, stages, fit = answer.choice, answer.judged.stages, answer.choice.fit
+    effects, verdict, doubts = _beside_other_causes(prepared, case, answer)
+    hints = _hints(prepared, case, stages) if verdict == "unexplained" else []
     change = None
     if baseline is not None:
         change = baseline.compared(prepared.records, prepared.case, part.own)
-    gear = by_other_gear(case, choice, records) if verdict != "no_gap" else None
-    units = in_other_unit(case.nominal, effects)
-    shares = {one.name: MOST for one in effects if prepared.is_otherwise(one)}
-    shares |= dict.fromkeys(units, MOST)
-    shares |= dict.fromkeys(gear.effects, gear.probability) if gear is not None else {}
-    if any(one.name in shares for one in effects):
-        effects = tuple(
-            replace(one, probability=shares.get(one.name, 1.0) * one.probability) for one in effects
-        )
-        verdict = "ambiguous" if verdict in ("effect", "mostly") else verdict
-    hints = ["" if gear is None else gear.words, *dict.fromkeys(units.values())]
-    if verdict == "unexplained":
-        of_channels = [lone_channel(outputs, case.nominal), late_channels(outputs, case.nominal)]
-        of_channels += [still_surfaces(records)] if AIRFRAME in faulty else []
-        hints += [*of_channels, unknown_levers(records) if AIRFRAME in faulty else ""]
-        if AIRFRAME in faulty and not any(of_channels):
-            hints.append(untried_terms(prepared.library, case.nominal))
-    if baseline is not None:
         others = baseline.compared(prepared.records, prepared.case, part.own, fit)
         verdict, stages = beside_healthy(verdict, stages, fit.effects, baseline.assumed, others)
     filtered = (one.filtered().items() for one in readers) if part.own else ()
@@ -279,14 +248,14 @@ def findings(prepared: Prepared, case: Case, choice: Choice) -> PartDiagnosis:
         verdict=verdict,
         stages=stages,
         effects=effects,
-        budget=judged.budget,
+        budget=answer.judged.budget,
         rivals=tuple(
             tuple(dict.fromkeys((s.effect.name, *(r.effect.name for r in s.rivals))))
             for s in choice.steps
             if s.rivals
         ),
         settings=settings_of(choice, case.nominal, case.control, outputs),
-        shrink=shrink(case, fitted, floors),
+        shrink=shrink(case, answer.fitted, floors_of(case, choice)),
         nominal=case.nominal,
         improved=_as_stamped(fit.rig, case.nominal, effects),
         records=dict(prepared.records),
@@ -297,10 +266,26 @@ def findings(prepared: Prepared, case: Case, choice: Choice) -> PartDiagnosis:
         change=change,
         trim=prepared.trim,
         filtered={name: one for each in filtered for name, one in each},
-        left_out=tuple(words for words in (*prepared.left_out, *hints, unknown) if words),
+        left_out=tuple(words for words in (*prepared.left_out, *doubts, *hints) if words),
         inseparable=inseparable(fit, case.control),
-        curved=curves,
+        curved=answer.curves,
     )
+
+
+def _hints(prepared: Prepared, case: Case, stages: Sequence[StageResult]) -> list[str]:
+    """Return what to check in a record that no effect explains, a sentence each."""
+    of_channels = [lone_channel(case.outputs, case.nominal)]
+    of_channels.append(late_channels(case.outputs, case.nominal))
+    if not _is_faulty(AIRFRAME, stages):
+        return of_channels
+    records = prepared.own_records
+    of_channels.append(still_surfaces(records))
+    untried = "" if any(of_channels) else untried_terms(prepared.library, case.nominal)
+    return [*of_channels, unknown_levers(records), untried]
+
+
+def _is_faulty(stage: str, stages: Sequence[StageResult]) -> bool:
+    return any(one.name == stage and one.guilty for one in stages)
 
 
 @dataclass(frozen=True)
@@ -331,13 +316,67 @@ def _judged(
     return _Judged(judge, stages, effects, budget, verdict_of(choice, stages, effects, budget))
 
 
+@dataclass(frozen=True)
+class _Answer:
+    """The last choice, the verdict on it, the curves, and the fit to every other stretch."""
+
+    choice: Choice
+    judged: _Judged
+    curves: Curves | None
+    fitted: Fit
+
+
+def _answer(prepared: Prepared, case: Case, choice: Choice) -> _Answer:
+    """Return the answer from a choice, with a function of the model or curves if they do better."""
+    choice, judged = _with_function(prepared, case, choice)
+    curves, fit = None, choice.fit
+    if prepared.part.own and judged.verdict != "no_gap":
+        curves = find_curves(case, choice, judged.effects, prepared.own_records)
+    beside = None
+    if curves is not None:
+        beside = beside_closed_form(judged.judge, case, judged.effects, curves)
+    if beside is not None:
+        judged = _judged(prepared, case, beside.choice, beside.effects)
+        return _Answer(beside.choice, judged, beside.curves, beside.fitted)
+    if curves is not None:
+        judged = _judged(prepared, case, choice, tuple(map(curves.probable, judged.effects)))
+    fitted = Problem(case).fit(fit.effects, fit.values, descent=Descent("own"), part="fitted")
+    return _Answer(choice, judged, curves, fitted)
+
+
+def _beside_other_causes(
+    prepared: Prepared, case: Case, answer: _Answer
+) -> tuple[tuple[EffectResult, ...], Verdict, list[str]]:
+    """Return effects and verdict beside what may cause the same and is no effect, and what it is.
+
+    This is the recorder, the other gear, the unit of a surface, or a trim that was not measured.
+    """
+    effects, verdict = answer.judged.effects, answer.judged.verdict
+    gear = None
+    if verdict != "no_gap":
+        gear = by_other_gear(case, answer.choice, prepared.own_records)
+    units = in_other_unit(case.nominal, effects)
+    shares = {one.name: MOST for one in effects if prepared.is_otherwise(one)}
+    shares |= dict.fromkeys(units, MOST)
+    words = list(dict.fromkeys(units.values()))
+    if gear is not None:
+        shares |= dict.fromkeys(gear.effects, gear.probability)
+        words.insert(0, gear.words)
+    if _is_faulty(AIRFRAME, answer.judged.stages):
+        words.append(unmeasured_trim(case.nominal, prepared.records))
+    if not any(one.name in shares for one in effects):
+        return effects, verdict, words
+    less = (replace(e, probability=shares.get(e.name, 1.0) * e.probability) for e in effects)
+    return tuple(less), "ambiguous" if verdict in ("effect", "mostly") else verdict, words
+
+
 def _with_function(prepared: Prepared, case: Case, choice: Choice) -> tuple[Choice, _Judged]:
     """Return a choice, or that of one function of the aircraft's model if it is likelier."""
     judged = _judged(prepared, case, choice)
     tried = any(effect.of for effect in prepared.library)
     if tried or not needs_a_function(case, choice, judged.effects):
         return choice, judged
-    functions = functions_tried(case.nominal, [reader.record for reader in prepared.readers])
+    functions = functions_tried(case.nominal, prepared.own_records)
     shown = tried_effects(functions, prepared.readers, case.outputs)
     other = by_one_function(case, choice, shown)
     return (choice, judged) if other is None else (other, _judged(prepared, case, other))

@@ -101,6 +101,11 @@ class Prepared:
     by_recorder: bool = False
     density: float = 1.0
 
+    @property
+    def own_records(self) -> list[Record]:
+        """The records as each reader has them."""
+        return [reader.record for reader in self.readers]
+
     def is_otherwise(self, effect: EffectResult) -> bool:
         """Tell whether the recorder or the air is as probable a cause as an effect."""
         if self.by_recorder or self.density == 1.0 or effect.name not in ("mass", *INERTIAS):
