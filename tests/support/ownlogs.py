@@ -91,14 +91,15 @@ def flown(
     fuel: float = 1.0,
     levers: Mapping[str, Callable[[float], float]] | None = None,
     before: Mapping[str, float] | None = None,
+    each: int = 1,
 ) -> tuple[Path, Floats]:
     """Fly an edited copy of a model from trim in bare JSBSim, with its own CSV output.
 
     `factors` are on functions by the ends of their names, `controls` how many of elevator, aileron
     and rudder move, `by_hand` or in jumps, `fuel` in two tanks, of the model's. `levers` are
     properties by what is added to their positions in trim at a time in s, `before` are properties
-    set before the trim. Returns the CSV file, and the properties at each frame, shape
-    (frames, properties).
+    set before the trim. The commands change every `each` frames. Returns the CSV file, and the
+    properties at each frame, shape (frames, properties).
     """
     models = edited_model(folder / "edited", model, multiplied(factors))
     listed = "".join(f"<property>{name}</property>" for name in properties)
@@ -123,7 +124,8 @@ def flown(
     names = [f"fcs/{name}-cmd-norm" for name in ("elevator", "aileron", "rudder")]
     trim, rows = [fdm[name] for name in names], []
     begun = {name: (fdm[name], added) for name, added in (levers or {}).items()}
-    for k, asked in enumerate(manoeuvre(length_s, by_hand=by_hand)[:, :controls]):
+    commands = manoeuvre(length_s, by_hand=by_hand)[:, :controls]
+    for k, asked in enumerate(np.repeat(commands[::each], each, axis=0)):
         rows.append([fdm[name] for name in properties])
         for name, held, moved in zip(names, trim, asked.tolist(), strict=False):
             fdm[name] = held + moved

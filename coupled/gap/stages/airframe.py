@@ -58,7 +58,7 @@ from coupled.gap.stages.surfaces import (
     trim_by_speed,
     trim_of,
 )
-from coupled.gap.thresholds import FAR, KNOWN, ROUGH, SHOT_TRIES
+from coupled.gap.thresholds import FAR, KNOWN, NEARLY_ALL, ROUGH, SHOT_TRIES
 from coupled.parallel import in_threads, in_turn
 from coupled.record.channels import LATERAL, ControlName, channel, motion_channels
 from coupled.record.record import Record
@@ -83,6 +83,7 @@ class Flights:
     """
 
     def __init__(self) -> None:
+        self.law: Between | None = None  # of the commands between rows, once it is estimated
         self._known: list[tuple[tuple[Any, ...], Flown | None]] = []
         self._errors: dict[tuple[Any, ...], list[Floats]] = {}
 
@@ -204,13 +205,49 @@ class Model:
             return [plain(), None]
         return in_threads(lambda fly: fly(), [plain, restarted])
 
+    @property
+    def law(self) -> Between:
+        """How the commands change between rows: the same of all flights of a record."""
+        if self.flights.law is None:
+            flight = self.rig.flight
+            assert flight is not None
+            known = self.rig.controls or flight.steps_per_frame == 1 or not self.compared
+            self.flights.law = "held" if known or self._holds_commands() else "pchip"
+        return self.flights.law
+
+    def _holds_commands(self) -> bool:
+        """Tell whether the motion has the whole change that commands held over a row make.
+
+        A simulation may hold its commands from row to row. If they jump within the rows, the motion
+        has about half of that change. Its share is the projection of the residual on the change.
+        The motion may be stamped late or early by half a row, as its nuisance parameter.
+        """
+        measured = np.column_stack([self.record[name] for name in self.compared])
+
+        def motion(law: Between) -> tuple[Floats, Floats]:
+            flown = self.fly(_in_time(self.rig), self.moved, between=law).motion
+            each = [np.column_stack([stamped(x, by) for x in flown.T]) for by in (-0.5, 0.0, 0.5)]
+            squares = [np.maximum(np.mean((measured - x) ** 2, axis=0), 1e-300) for x in each]
+            best = int(np.argmin([np.sum(np.log(one)) for one in squares]))
+            return each[best], squares[best]
+
+        laws: tuple[Between, ...] = ("held", "pchip")
+        try:
+            (held, squares), (other, _) = in_threads(motion, laws)
+        except InputError:  # no trim
+            return False
+        change = (held - other) / np.sqrt(squares)
+        left = (measured - other) / np.sqrt(squares)
+        share = float(np.sum(left * change)) / max(float(np.sum(change**2)), 1e-300)
+        return share > NEARLY_ALL
+
     def unknown_between(self, plain: Floats, by_shots: bool = False) -> list[float]:
         """Return the mean square change of each channel by other interpolations between the rows.
 
         `by_shots`: those of `SHOT`.
         """
         flight, restarts = _in_time(self.rig), self.restarts if by_shots else None
-        if self.rig.controls or flight.steps_per_frame == 1:
+        if self.law == "held":
             return [0.0] * plain.shape[1]
         states = None if restarts is None else restarts.at()
 
@@ -254,7 +291,7 @@ class Model:
         moved: Sequence[Moved],
         with_error: bool = False,
         late: float = 0.0,
-        between: Between = "pchip",
+        between: Between | None = None,
         restarts: States | None = None,
         channels: tuple[str, ...] = (),
         air: GivenAir | None = None,
@@ -269,8 +306,7 @@ class Model:
         air = self.air(flight, late, with_error) if air is None else air
         channels = channels or (self.compared if restarts is None else SHOT)
         given = (flight, self.rig.frame_rate, flown_by(self.rig), moved, channels, self.record)
-        rows = "held" if self.rig.controls else between
-        manner = Manner(air, rows, restarts or {}, coarse)
+        manner = Manner(air, between or self.law, restarts or {}, coarse)
         return in_turn(partial(fly_open_loop, *given, manner))
 
 
