@@ -56,7 +56,6 @@ from coupled.gap.thresholds import (
     FAR,
     LEAST_SERVO_RATIO,
     LESSER,
-    MINOR,
     NEGLIGIBLE,
     NORMAL_95,
     CLOCK_s,
@@ -430,7 +429,7 @@ class _Fitter:
         priors = {CLOCK.value_key(number): (0.0, number.high / NORMAL_95)}
         start = start or {}
         beside += self._late_grip(effects)
-        case = Case(self.rig, self.control, outputs)
+        case = Case(self.rig, self.control, outputs, way=self.way)
         rigid = fit_set(case, effects, beside, priors, start, part=part)
         if not (loader and self._contact(case, effects)):
             return rigid
@@ -439,8 +438,8 @@ class _Fitter:
             return self._yielding(case, effects, beside, priors, (rigid.values, start), part)
 
         left, soft = yielding(case)
-        if self._ends_at_longest(case, soft):
-            longer = yielding(replace(case, longest=self.way))
+        if (larger := case.with_longer_contact(soft)) is not None:
+            longer = yielding(larger)
             left, soft = longer if longer[0] < (1.0 - LESSER) * left else (left, soft)
         ours = touched(outputs, self._contact(case, effects))
         return soft if left < (1.0 - LESSER) * _held_out_rms(ours, rigid.rig) else rigid
@@ -484,13 +483,6 @@ class _Fitter:
             soft = fit_set(case, effects, free, priors, begun, part=part)
             each.append((_held_out_rms(ours, soft.rig), soft))
         return min(each, key=lambda one: one[0])
-
-    def _ends_at_longest(self, case: Case, soft: Fit) -> bool:
-        """Tell whether a fit's contact yields by the largest length, and the motion is larger."""
-        (length,) = case.contact[0].free if case.contact else (None,)
-        if length is None or self.way <= length.high:
-            return False
-        return soft.values.get(case.contact[0].value_key(length), 0.0) > (1.0 - MINOR) * length.high
 
     def with_contact_starts(
         self, effects: Sequence[Effect]

@@ -48,6 +48,7 @@ from coupled.gap.checks import (
 )
 from coupled.gap.effects.effect import Effect, keys_of
 from coupled.gap.effects.library import library_of
+from coupled.gap.effects.settings import way_of
 from coupled.gap.findings.healthy import Baseline
 from coupled.gap.findings.result import EffectResult
 from coupled.gap.search.case import Case, Tell, allowing_for_contact
@@ -230,7 +231,7 @@ def prepare(
         library = with_terms(library, rig, records)
     return Prepared(
         part,
-        Case(rig, control, outputs, tell, judged.under, model_error_in_floors=baseline is not None),
+        Case(rig, control, outputs, tell, judged.under, baseline is not None, (), way_of(readers)),
         tuple(tried_effects(library, readers, outputs)),
         tuple(readers),
         records,

@@ -20,7 +20,7 @@ from coupled.gap.search.found import Candidate, Choice, Fit, Found
 from coupled.gap.stages.tried import as_judged
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
-from tests.support.machines import damper, damper_rig
+from tests.support.machines import damper, damper_rig, soft_damper, soft_damper_rig
 from tests.support.rigs import BENCH, bench
 
 HEAVY_kg = 8.0
@@ -46,6 +46,20 @@ def test_a_damper_beside_its_own_numbers_has_no_gap() -> None:
     assert found.verdict == "no_gap"
     assert found.stage("loader").gap == pytest.approx(1.0, abs=0.15)
     assert found.closed_loop is None  # nobody flies it by its force
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("yields_m", [2e-4, 2e-3])
+def test_friction_that_yields_far_is_found_beside_a_spring_that_carries_little(
+    yields_m: float,
+) -> None:
+    """Dry contacts yield by less than half a millimetre, a magnetorheological damper by more."""
+    found = diagnose(soft_damper_rig(), {"r": soft_damper(yields_m)})
+    (effect,) = found.effects
+    assert (effect.name, found.verdict) == ("presliding_friction", "effect")
+    friction, stiffness, _ = effect.parameters
+    assert friction.value == pytest.approx(600.0, rel=0.01)
+    assert stiffness.value == pytest.approx(600.0 / yields_m, rel=0.1)
 
 
 def heavy(rate_Hz: float, mass_kg: float = HEAVY_kg, seconds: float = 40.0) -> tuple[Rig, Record]:

@@ -190,6 +190,36 @@ def damper_rig(damping: float = 2000.0, drive: str = "displacement") -> Rig:
     return rig.changed({"controls.column.drive": drive})
 
 
+def soft_damper(yields_m: float, friction_N: float = 600.0, rate_Hz: float = 100.0) -> Record:
+    """Return a record of a damper with a soft spring and friction that yields, in imposed motion.
+
+    900 N·s/m and 1500 N/m. The friction is that of Bouc and Wen with n = 1 and β = γ: along a way s
+    it goes to its limit as exp(−s/yields), and back to zero as −s/yields.
+    """
+    fine, seconds = 20, 12.0
+    times = np.arange(round(seconds * rate_Hz) * fine) / (fine * rate_Hz)
+    lines = ((8e-3, 0.6, 0.4), (5e-3, 1.3, 2.0), (2e-3, 2.5, 5.0))
+    way = np.sum([a * np.sin(2.0 * np.pi * f * times + phase) for a, f, phase in lines], axis=0)
+    speed, dry, bent = np.gradient(way, times), np.zeros(len(times)), 0.0
+    for k, moved in enumerate(np.diff(way).tolist(), 1):
+        limit = 1.0 if moved > 0.0 else -1.0
+        back = min(abs(moved), yields_m * max(-limit * bent, 0.0))
+        bent += limit * back / yields_m
+        bent = limit - (limit - bent) * float(np.exp((back - abs(moved)) / yields_m))
+        dry[k] = bent
+    force = 900.0 * speed + 1500.0 * way + friction_N * dry
+    hiss = np.random.default_rng(6).normal(size=(2, len(times[::fine])))
+    read = {"force_N": force[::fine] + 2.0 * hiss[0], "deflection_m": way[::fine] + 4e-6 * hiss[1]}
+    return recorded(rate_Hz, **read)
+
+
+def soft_damper_rig() -> Rig:
+    """Return the rig of that damper, without friction."""
+    numbers = {"mass_kg": 1e-3, "damping_N_s_per_m": 900.0, "servo_frequency_Hz": 0.0}
+    rig = plain_rig(100.0, numbers, 1500.0)
+    return rig.changed({"controls.column.drive": "displacement"})
+
+
 def axis(
     rate_Hz: float = 25.0,
     seconds: float = 60.0,

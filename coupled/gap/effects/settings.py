@@ -218,6 +218,12 @@ class Scales:
         return float(force ** powers[0] * (way * usual / COLUMN_WAY["m"]) ** powers[1])
 
 
+def way_of(readings: Sequence[Reading]) -> float:
+    """Return the rms of a control's motion over records, d; 0 if it is unknown."""
+    scales = Scales.of(readings)
+    return 0.0 if scales is None else scales.way
+
+
 def in_scale(
     effects: Sequence[Effect], scales: Scales | None, rig: Rig, control: ControlName
 ) -> list[Effect]:

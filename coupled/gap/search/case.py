@@ -75,8 +75,8 @@ class Case:
     `outputs_with_noise_of` gives the outputs with noise floors estimated with another rig. If
     `model_error_in_floors`, the floors include the error of the model of the healthy machine.
     `timings` are (effect, timing, interval of the onset) of effects that begin within the record.
-    They apply to all effects that free the same parameters. `longest` is the largest length of a
-    contact if not the usual one.
+    They apply to all effects that free the same parameters. `way` is the rms of the motion, d, 0 if
+    unknown; `longest` is the largest presliding length if not the usual one.
     """
 
     nominal: Rig
@@ -86,6 +86,7 @@ class Case:
     outputs_with_noise_of: Callable[[Rig], Sequence[Output]] | None = None
     model_error_in_floors: bool = False
     timings: Sequence[tuple[Effect, Timing, Bounds]] = ()
+    way: float = 0.0
     longest: float = 0.0
 
     @cached_property
@@ -247,6 +248,14 @@ class Case:
             (timing, seen, {p.key for p in one.parameters}) for one, timing, seen in self.timings
         )
         return next(((timing, seen) for timing, seen, timed in each if timed & keys), None)
+
+    def with_longer_contact(self, found: Fit) -> Case | None:
+        """Return the case with presliding up to the motion, if a fit's has the largest length."""
+        (length,) = self.contact[0].free if self.contact else (None,)
+        if length is None or self.way <= length.high:
+            return None
+        fitted = found.values.get(self.contact[0].value_key(length), 0.0)
+        return replace(self, longest=self.way) if fitted > (1.0 - MINOR) * length.high else None
 
     def with_only(self, found: Fit, effects: Sequence[Effect]) -> Rig:
         """Return the rig with some effects of a fit, and the fitted nuisance parameters."""

@@ -36,10 +36,27 @@ Parts = list[tuple[Floats, Floats]]  # action of an effect and residual, of each
 
 def search(case: Case, library: Sequence[Effect]) -> tuple[Case, Choice]:
     """Return the effects that explain a record's gap, and the case with its last noise floors."""
-    found = search_sets(case, library)
+    found = _search_with_longer_contact(*search_sets(case, library), library)
     while (later := _search_with_onset(*found, library)) is not None:
         found = later
     return _search_with_drift(*found, library) or found
+
+
+def _search_with_longer_contact(
+    case: Case, found: Choice, library: Sequence[Effect]
+) -> tuple[Case, Choice]:
+    """Repeat the search with presliding up to the motion, if the largest length was found.
+
+    Other effects compensate for a contact that is too short. Return the likelier result.
+    """
+    larger = case.with_longer_contact(found.fit)
+    if larger is None:
+        return case, found
+    problem, (after, other) = Problem(case), search_sets(larger, library)
+    error = problem.model_error(found.without_effects.rig)
+    one, more = (evidence(Problem(at), c.fit, error) for at, c in ((case, found), (after, other)))
+    samples = fewest_unexplained([one, more])
+    return (after, other) if more.log(samples) > one.log(samples) else (case, found)
 
 
 def _search_with_drift(

@@ -22,7 +22,7 @@ from coupled.gap.signals.floors import Drive, floor_from, noise_in
 from coupled.gap.signals.live import Assumed, Live, Mask, live_of
 from coupled.gap.signals.missed import Missed, missed_in
 from coupled.gap.signals.output import Floats, above_rounding
-from coupled.gap.thresholds import MINOR, NEGLIGIBLE, PARTLY, SETTLE_s, SHORTEST_RECORD_s
+from coupled.gap.thresholds import MINOR, MOST, NEGLIGIBLE, PARTLY, SETTLE_s, SHORTEST_RECORD_s
 from coupled.record.channels import SURFACES, ControlName, channel
 from coupled.record.record import Record
 from coupled.rig.crossing import leaking
@@ -293,15 +293,19 @@ class Reading:
     def in_series(self) -> bool:
         """Whether the record has F and δ without δc: loader and linkage are judged in series.
 
-        With imposed motion, only if a spring holds the loader.
+        With imposed motion, only if a spring holds the loader: its force is most of that measured.
         """
         if self.set_points or self.name_of("computed") in self.record:
             return False
-        needed = (self.name_of(quantity) for quantity in ("force", "deflection"))
+        needed = [self.name_of(quantity) for quantity in ("force", "deflection")]
         if not all(name in self.record for name in needed):
             return False
+        if not self.by_hand:
+            return True
         softest = softest_gradient(self.rig, self.control, self.record)
-        return not self.by_hand or not drifts(self.rig, self.control, softest)
+        force, motion = (float(np.std(self.record[name])) for name in needed)
+        holds = softest * motion > MOST * force
+        return holds and not drifts(self.rig, self.control, softest)
 
     @property
     def imposed(self) -> str:
