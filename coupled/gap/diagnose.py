@@ -20,8 +20,6 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
-import numpy as np
-
 from coupled.errors import InputError
 from coupled.gap.chain import AIRFRAME, STAGES, Part
 from coupled.gap.checks import unmeasured_trim
@@ -33,7 +31,7 @@ from coupled.gap.findings.curves import Curves, find_curves
 from coupled.gap.findings.diagnosis import Diagnosis, PartDiagnosis, WholeDiagnosis
 from coupled.gap.findings.gear import by_other_gear
 from coupled.gap.findings.healthy import Baseline, beside_healthy
-from coupled.gap.findings.hints import late_channels, still_surfaces, unknown_levers
+from coupled.gap.findings.hints import held_still, late_channels, still_surfaces, unknown_levers
 from coupled.gap.findings.judge import Judge
 from coupled.gap.findings.onefunction import by_one_function, needs_a_function
 from coupled.gap.findings.result import EffectResult, StageResult, Verdict
@@ -45,12 +43,12 @@ from coupled.gap.search.descent import Descent
 from coupled.gap.search.found import Choice, Fit, inseparable
 from coupled.gap.search.histories import search
 from coupled.gap.search.problem import Problem
-from coupled.gap.signals.output import Floats, estimate_noise
+from coupled.gap.signals.output import Floats, exceeds_noise
 from coupled.gap.signals.reading import Reading
 from coupled.gap.stages.airframe import needs
 from coupled.gap.stages.surfaces import surface_points
 from coupled.gap.stages.tried import TERMS_OPTION, functions_tried, tried_effects, untried_terms
-from coupled.gap.thresholds import DOUBLED, MOST, TINY
+from coupled.gap.thresholds import MOST, TINY
 from coupled.parallel import in_threads, threads
 from coupled.record.channels import CONTROL_NAMES, ControlName, channel
 from coupled.record.record import Record
@@ -157,7 +155,7 @@ def parts_of(
 def moves(rig: Rig, record: Record, control: ControlName) -> bool:
     """Tell whether a record has a control of a rig, and moves it by more than noise."""
     least = TINY * rig.controls[control].travel
-    return any(_beyond_noise(signal, least) for signal in _way(record, control))
+    return any(exceeds_noise(signal, least) for signal in _way(record, control))
 
 
 def _way(record: Record, control: ControlName) -> list[Floats]:
@@ -181,20 +179,7 @@ def _why_not(control: ControlName, moved: bool) -> str:
 def _pulled(record: Record, control: ControlName) -> bool:
     """Tell whether a force acts on a control whose motion is recorded."""
     name = channel(control, "force")
-    return name in record and bool(_way(record, control)) and _beyond_noise(record[name])
-
-
-def _beyond_noise(signal: Floats, least: float = 0.0) -> bool:
-    """Tell whether the standard deviation of a signal is well above its noise, and above `least`.
-
-    Also true of a signal with a value that is no number: the record is then refused with the row.
-    """
-    if not np.all(np.isfinite(signal)):
-        return True
-    spread = float(np.std(signal))
-    if len(signal) < 5 or spread <= least:
-        return False
-    return spread > DOUBLED * estimate_noise(signal).rms
+    return name in record and bool(_way(record, control)) and exceeds_noise(record[name])
 
 
 def _airframe_first(
@@ -349,7 +334,8 @@ def _beside_other_causes(
 ) -> tuple[tuple[EffectResult, ...], Verdict, list[str]]:
     """Return effects and verdict beside what may cause the same and is no effect, and what it is.
 
-    This is the recorder, the other gear, the unit of a surface, or a trim that was not measured.
+    This is the recorder, the other gear, the unit of a surface, whatever holds a loader still, or a
+    trim that was not measured.
     """
     effects, verdict = answer.judged.effects, answer.judged.verdict
     gear = None
@@ -362,6 +348,10 @@ def _beside_other_causes(
     if gear is not None:
         shares |= dict.fromkeys(gear.effects, gear.probability)
         words.insert(0, gear.words)
+    if _is_faulty("loader", answer.judged.stages):
+        words.append(held_still(case.nominal, case.control, prepared.own_records))
+        loaders = [one.name for one in effects if one.stage == "loader"]
+        shares |= dict.fromkeys(loaders if words[-1] else (), MOST)
     if _is_faulty(AIRFRAME, answer.judged.stages):
         words.append(unmeasured_trim(case.nominal, prepared.records))
     if not any(one.name in shares for one in effects):

@@ -1,4 +1,4 @@
-"""What to check in the channels of a flight whose gap no effect explains."""
+"""What to check in the channels of a record whose gap no effect explains, or not one alone."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ import numpy as np
 
 from coupled.errors import joined
 from coupled.gap.chain import AIRFRAME
-from coupled.gap.signals.output import TRIM, Output
+from coupled.gap.signals.output import TRIM, Output, exceeds_noise
 from coupled.gap.stages.surfaces import states_trim, surface_channel
 from coupled.gap.thresholds import NEARLY_ALL, WINDOW_s
-from coupled.record.channels import CONTROL_NAMES
+from coupled.record.channels import CONTROL_NAMES, ControlName, channel
 from coupled.record.levers import levers_of
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
@@ -54,6 +54,29 @@ def still_surfaces(records: Sequence[Record]) -> str:
     still = [name for name, each in values.items() if each and not any(map(np.ptp, each))]
     verb = "never changes" if len(still) == 1 else "never change"
     return f"{joined(still)} {verb}: is a sensor stuck?" if still else ""
+
+
+def held_still(rig: Rig, control: ControlName, records: Sequence[Record]) -> str:
+    """Return a sentence on a loader that no force of the records moves; empty if one moves it.
+
+    Whatever holds it, friction, breakout or a stop, is then only known to exceed the force.
+    """
+    if not rests(rig, control, records):
+        return ""
+    most = max(float(np.max(np.abs(one[channel(control, "force")]))) for one in records)
+    return (
+        f"No force up to {most:.3g} N moves the loader of the {control}: friction, breakout, a stop"
+        " or a jam may hold it, and its size is only a lower bound. Record a force that moves it."
+    )
+
+
+def rests(rig: Rig, control: ControlName, records: Sequence[Record]) -> bool:
+    """Tell whether the computed deflection of a loader is noise alone in all records."""
+    names = channel(control, "computed"), channel(control, "force")
+    known = control in rig.controls and all(name in one for one in records for name in names)
+    if not known or rig.controls[control].drive != "force":
+        return False
+    return not any(exceeds_noise(one[names[0]]) for one in records)
 
 
 def unknown_levers(records: Sequence[Record]) -> str:

@@ -24,6 +24,7 @@ from coupled.gap.effects.effect import Effect, apply, keys_of, possible, touched
 from coupled.gap.effects.library import EFFECTS
 from coupled.gap.effects.settings import settings
 from coupled.gap.findings.flown import fly_force
+from coupled.gap.findings.hints import rests
 from coupled.gap.findings.summary import plain
 from coupled.gap.noise.noise import rms_of
 from coupled.gap.search.case import Case
@@ -187,12 +188,13 @@ def next_tests(
 ) -> tuple[ProposedTest, ...]:
     """Return the tests that would discriminate the first alternatives found, the best first.
 
-    They are forces, which a bench that imposes the motion cannot apply.
+    They are forces up to the record's, which a bench that imposes the motion cannot apply, and
+    which do not move a loader that rests in the record.
     """
     step = next((step for step in choice.steps if step.rivals), None)
     if step is None or channel(control, "force") not in record:
         return ()
-    if nominal.controls[control].drive != "force":
+    if nominal.controls[control].drive != "force" or rests(nominal, control, [record]):
         return ()
     rival = step.rivals[0]
     others = tuple(effect for effect in choice.fit.effects if effect is not step.effect)

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from coupled.gap.noise.noise import Noise, noise_of, rms_of
 from coupled.gap.thresholds import (
+    DOUBLED,
     FAULTY_FROM,
     FEW_STRETCHES,
     MINOR,
@@ -307,6 +308,19 @@ def white(signal: Floats) -> float:
 def estimate_noise(signal: Floats) -> Noise:
     """Return the noise in a smooth signal, at least its rounding, which may not be white."""
     return above_rounding(noise_of(signal), signal)
+
+
+def exceeds_noise(signal: Floats, least: float = 0.0) -> bool:
+    """Tell whether the standard deviation of a signal is well above its noise, and above `least`.
+
+    Also true of a signal with a value that is no number: the record is then refused with the row.
+    """
+    if not np.all(np.isfinite(signal)):
+        return True
+    spread = float(np.std(signal))
+    if len(signal) < 5 or spread <= least:
+        return False
+    return spread > DOUBLED * estimate_noise(signal).rms
 
 
 def above_rounding(noise: Noise, signal: Floats) -> Noise:
