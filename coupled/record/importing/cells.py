@@ -70,6 +70,15 @@ def element(
     return lists.list.get(wanted - 1, null_on_oob=True)
 
 
+def truths(column: pl.Series) -> pl.Series:
+    """Return a column of the words true and false as such values; any other column as it is."""
+    if column.dtype != pl.String:
+        return column
+    words = column.str.strip_chars().str.to_lowercase()
+    is_known = words.is_in(["true", "false"]).all() and len(words) > words.null_count()
+    return words == "true" if is_known else column
+
+
 def lists_in(column: pl.Series) -> pl.Series | None:
     """Return a column's cells as lists of text or numbers; None if they are not lists."""
     if column.dtype == pl.String:

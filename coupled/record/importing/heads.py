@@ -2,7 +2,8 @@
 
 JSBSim (`<output type="CSV">`): `Time`, then names with units, such as `q bar (psf)`, and properties
 by their paths, `/fdm/jsbsim/velocities/q-rad_sec`. FlightGear (`/logging/log`, its README.logging):
-`Time`, the simulated time in s, then properties by their paths, or by titles of the user. X-Plane
+`Time`, the simulated time in s, then properties by their paths, whose parts are numbered, as
+`/orientation[0]/q-body[0]` (logger.cxx), or by titles of the user. X-Plane
 (`Data.txt`): names in two parts separated by `|`, such as `_totl,_time |pitch,__deg |`.
 
 Ambiguous columns are left out: X-Plane's `P`, `Q` and `R` (its documentation calls Q the yaw rate,
@@ -99,7 +100,7 @@ _XPLANE = {
     "pitch,__deg": ("pitch_rad", "deg"),
     "hding,_true": ("heading_rad", "deg"),
 }
-# A lever's column, with JSBSim's property. FlightGear writes no number of its first engine.
+# A lever's column, with JSBSim's property, as FlightGear's JSBSim.cxx copies them.
 _ENGINE = r"/controls/engines/engine(\[\d+\])?/"
 _LEVERS = [
     (re.compile(pattern), jsbsim)
@@ -109,6 +110,9 @@ _LEVERS = [
         (r"/controls/flight/flaps", "fcs/flap-cmd-norm"),
         (r"/controls/flight/speedbrake", "fcs/speedbrake-cmd-norm"),
         (r"/controls/flight/spoilers", "fcs/spoiler-cmd-norm"),
+        (r"/controls/gear/gear-down", "gear/gear-cmd-norm"),
+        (r"/surface-positions/(flap|speedbrake|spoiler)s?-pos-norm", r"fcs/\1-pos-norm"),
+        (r"/gear/gear/position-norm", "gear/gear-pos-norm"),
         (rf"{_ENGINE}(throttle|mixture)", r"fcs/\2-cmd-norm\1"),
         (rf"{_ENGINE}propeller-pitch", r"fcs/advance-cmd-norm\1"),
     )
@@ -141,8 +145,8 @@ def known_map(path: Path) -> tuple[str, LogMap]:
         raise InputError(path, "", f"{problem} to have one proposed")
     head, names = found
     channels, levers = dict[str, Channel](), dict[str, Channel]()
-    for name in sorted(names, key=lambda one: "-pos-" in one):  # a command before a position
-        channel, unit = head.known.get(name, ("", ""))
+    for name in sorted(names, key=_is_position):  # a command before a position
+        channel, unit = head.known.get(_plain(name), ("", ""))
         if channel and names.count(name) == 1:
             channels.setdefault(channel, Channel(source=name, unit=unit))
         elif (lever := _lever(name)) and names.count(name) == 1:
@@ -180,9 +184,18 @@ def _trimmed_from(text: str, delimiter: str, columns: Sequence[int]) -> float:
 def _lever(name: str) -> str:
     """Return the channel of a lever's column (`levers`); "" for another column."""
     for program, jsbsim in _LEVERS:
-        if (found := program.fullmatch(name)) is not None:
-            return lever_channel(found.expand(jsbsim).replace("[0]", ""))
+        if (found := program.fullmatch(_plain(name))) is not None:
+            return lever_channel(found.expand(jsbsim))
     return ""
+
+
+def _is_position(name: str) -> bool:
+    return "-pos-" in name or "/position-norm" in name
+
+
+def _plain(name: str) -> str:
+    """Return a property's path without the numbers of first nodes, as JSBSim has it."""
+    return name.replace("[0]", "")
 
 
 def _head(line: str) -> tuple[_Head, list[str]] | None:
@@ -196,7 +209,7 @@ def _head(line: str) -> tuple[_Head, list[str]] | None:
         if names[0] != "Time" or len(names) < 2:
             continue
         paths = [name for name in names[1:] if name.startswith("/")]
-        if any(not name.startswith(_TREE) for name in paths):
+        if any(not _plain(name).startswith(_TREE) for name in paths):
             known = {**_FLIGHTGEAR, **_JSBSIM_PROPERTIES}
             return _Head("FlightGear", delimiter, "Time", known), names
         if paths or any(name in _JSBSIM for name in names):

@@ -28,6 +28,7 @@ from coupled.record.importing.cells import (
     labels_of,
     moments,
     signed,
+    truths,
 )
 from coupled.record.importing.formats.columns import Found, named_apart
 from coupled.record.importing.jsonlog import read_json
@@ -105,6 +106,8 @@ class Log:
                 "holds true and false, no quantity; own = true reads it for a channel of yours"
             )
             raise InputError(self.file, name, problem)
+        if channel.own:
+            column = truths(column)
         if channel.element is not None:
             names = labels_of(name, column, self.columns)
             where = Place(self.file, name, self.line)

@@ -115,6 +115,36 @@ def test_flightgears_log_has_seconds_and_property_paths(tmp_path: Path) -> None:
     assert {name: float(record[name][0]) for name in levers} == levers
 
 
+def test_flightgears_own_titles_number_each_part_of_a_path(tmp_path: Path) -> None:
+    """As SGPropertyNode::getPath writes them; a switch is in words, as getStringValue."""
+    head = "Time,/orientation[0]/pitch-deg[0],/fdm[0]/jsbsim[0]/aero[0]/qbar-psf[0]"
+    head += ",/controls[0]/engines[0]/engine[0]/throttle[0]"
+    head += ",/controls[0]/engines[0]/engine[1]/throttle[0]"
+    head += ",/controls[0]/gear[0]/gear-down[0],/gear[0]/gear[0]/position-norm[0]"
+    head += ",/surface-positions[0]/flap-pos-norm[0],/surface-positions[0]/spoilers-pos-norm[0]"
+    down = ["true"] * 60 + ["false"] * 60
+    rows = [
+        f"{k / 60:.6g},{3 * np.sin(k / 60):.6f},21.5,0.7,0.6,{word},1,0.2,0"
+        for k, word in enumerate(down)
+    ]
+    (tmp_path / "fg_log.csv").write_text("\n".join([head, *rows]) + "\n")
+    record, account = import_log(tmp_path / "fg_log.csv")
+    assert record["pitch_rad"] == pytest.approx(3 * DEG * np.sin(np.arange(120) / 60), abs=1e-7)
+    assert record["dynamic_pressure_Pa"] == pytest.approx(21.5 * 47.88025898)
+    assert record["gear_norm"].tolist() == [1.0] * 60 + [0.0] * 60
+    levers = {"throttle_norm": 0.7, "throttle_1_norm": 0.6, "flap_norm": 0.2, "spoiler_norm": 0.0}
+    assert {name: float(record[name][0]) for name in levers} == levers
+    assert account.unmapped == ("/gear[0]/gear[0]/position-norm[0]",)
+
+
+def test_a_lever_in_other_words_is_refused(tmp_path: Path) -> None:
+    rows = [f"{k / 60:.6g},{k % 7},{'up' if k else 'true'}" for k in range(120)]
+    head = "Time,/orientation/pitch-deg,/controls/gear/gear-down"
+    (tmp_path / "fg_log.csv").write_text("\n".join([head, *rows]) + "\n")
+    with pytest.raises(InputError, match=r"gear-down: row 2 holds 'true', which is no number"):
+        import_log(tmp_path / "fg_log.csv")
+
+
 def xplane(rows: int = 100) -> str:
     time = np.arange(rows) / 50.0
     names = ["_real,_time", "_totl,_time", "Vtrue,_ktas", "pitch,__deg", "_roll,__deg"]
