@@ -31,7 +31,13 @@ from coupled.gap.findings.curves import Curves, find_curves
 from coupled.gap.findings.diagnosis import Diagnosis, PartDiagnosis, WholeDiagnosis
 from coupled.gap.findings.gear import by_other_gear
 from coupled.gap.findings.healthy import Baseline, beside_healthy
-from coupled.gap.findings.hints import held_still, late_channels, still_surfaces, unknown_levers
+from coupled.gap.findings.hints import (
+    held_still,
+    late_channels,
+    steady_sideslip,
+    still_surfaces,
+    unknown_levers,
+)
 from coupled.gap.findings.judge import Judge
 from coupled.gap.findings.onefunction import by_one_function, needs_a_function
 from coupled.gap.findings.result import EffectResult, StageResult, Verdict
@@ -334,8 +340,8 @@ def _beside_other_causes(
 ) -> tuple[tuple[EffectResult, ...], Verdict, list[str]]:
     """Return effects and verdict beside what may cause the same and is no effect, and what it is.
 
-    This is the recorder, the other gear, the unit of a surface, whatever holds a loader still, or a
-    trim that was not measured.
+    This is the recorder, the other gear, the unit of a surface, whatever holds a loader still, a
+    steady sideslip, or a trim that was not measured.
     """
     effects, verdict = answer.judged.effects, answer.judged.verdict
     gear = None
@@ -352,6 +358,9 @@ def _beside_other_causes(
         words.append(held_still(case.nominal, case.control, prepared.own_records))
         loaders = [one.name for one in effects if one.stage == "loader"]
         shares |= dict.fromkeys(loaders if words[-1] else (), MOST)
+    if slip := steady_sideslip(prepared.records, effects):
+        words.append(slip)
+        shares["sideslip_zero"] = MOST
     if _is_faulty(AIRFRAME, answer.judged.stages):
         words.append(unmeasured_trim(case.nominal, prepared.records))
     if not any(one.name in shares for one in effects):
