@@ -8,8 +8,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from coupled.errors import joined
+from coupled.flight.airframe import SPEED
 from coupled.gap.chain import AIRFRAME
-from coupled.gap.checks import SPEED
 from coupled.gap.findings.result import EffectResult
 from coupled.gap.signals.output import TRIM, Output, estimate_noise, exceeds_noise
 from coupled.gap.stages.surfaces import states_trim, surface_channel
