@@ -36,7 +36,7 @@ from coupled.gap.findings.hints import (
     late_channels,
     steady_sideslip,
     still_surfaces,
-    unknown_levers,
+    unknown_conditions,
 )
 from coupled.gap.findings.judge import Judge
 from coupled.gap.findings.onefunction import by_one_function, needs_a_function
@@ -272,7 +272,7 @@ def _hints(prepared: Prepared, case: Case, stages: Sequence[StageResult]) -> lis
     records = prepared.own_records
     of_channels.append(still_surfaces(records))
     untried = "" if any(of_channels) else untried_terms(prepared.library, case.nominal)
-    return [*of_channels, unknown_levers(records), untried]
+    return [*of_channels, unknown_conditions(records), untried]
 
 
 def _is_faulty(stage: str, stages: Sequence[StageResult]) -> bool:

@@ -27,7 +27,7 @@ from coupled.gap.diagnose import diagnose, findings
 from coupled.gap.effects.library import BY_NAME
 from coupled.gap.findings.diagnosis import Diagnosis
 from coupled.gap.findings.flown import fly_force
-from coupled.gap.findings.hints import late_channels, still_surfaces, unknown_levers
+from coupled.gap.findings.hints import late_channels, still_surfaces, unknown_conditions
 from coupled.gap.findings.where import lone_channel
 from coupled.gap.prepare import finely_stepped, prepare
 from coupled.gap.search.beam import search_sets
@@ -376,14 +376,23 @@ def test_a_throttle_that_moves_is_seen_by_an_aircraft_alone(healthy: Record) -> 
 
 
 def test_levers_that_a_log_does_not_have_are_named(healthy: Record) -> None:
-    assert "throttle_norm, flap_norm and gear_norm" in unknown_levers([healthy])
+    assert "throttle_norm, flap_norm and gear_norm" in unknown_conditions([healthy])
     given = Record(
         (*healthy.channels, "throttle_1_norm"),
         np.column_stack([healthy.data, np.full(len(healthy), 0.7)]),
     )
-    assert unknown_levers([given]).endswith(": flap_norm and gear_norm.")
+    assert ": flap_norm and gear_norm. " in unknown_conditions([given])
     manifest = {"rig": {"flight": {"model": "c172p"}}}
-    assert unknown_levers([Record(healthy.channels, healthy.data, manifest)]) == ""
+    assert unknown_conditions([Record(healthy.channels, healthy.data, manifest)]) == ""
+
+
+def test_what_no_lever_shows_of_a_flight_is_named_beside_all_levers(healthy: Record) -> None:
+    levers = ("throttle_norm", "flap_norm", "gear_norm")
+    given = Record(
+        (*healthy.channels, *levers), np.column_stack([healthy.data, np.zeros((len(healthy), 3))])
+    )
+    words = unknown_conditions([given])
+    assert "engine failure, wind shear or turbulence" in words and "Not recorded" not in words
 
 
 def test_a_rig_takes_the_frame_rate_of_a_log_and_keeps_its_own_steps(healthy: Record) -> None:

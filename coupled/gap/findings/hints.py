@@ -114,11 +114,17 @@ def _unbalanced_bank_rad(record: Record) -> float:
     return mean if abs(mean) > max(TRIM_SIGMAS * error, NEGLIGIBLE) else 0.0
 
 
-def unknown_levers(records: Sequence[Record]) -> str:
-    """Return a sentence on the levers that no record has; empty if the flight was simulated."""
+def unknown_conditions(records: Sequence[Record]) -> str:
+    """Return what of a flight no record shows, in words; empty if the flight was simulated."""
     if any(map(states_trim, records)):
         return ""
     recorded = {kind for one in records for kind, _ in levers_of(one.channels).values()}
     lacking = [kind for kind in ("throttle", "flap", "gear") if kind not in recorded]
-    names = [f"{kind}_norm" for kind in lacking]
-    return f"Not recorded, and in the model as in trim: {joined(names)}." if names else ""
+    words = ""
+    if lacking:
+        names = joined([f"{kind}_norm" for kind in lacking])
+        words = f"Not recorded, and in the model as in trim: {names}. "
+    return words + (
+        "In the model all engines run, and no wind changes the airspeed or rotates the "
+        "aircraft: leave out the rows with an engine failure, wind shear or turbulence."
+    )
