@@ -16,7 +16,7 @@ predicted once, from all measured surfaces. It is the only part of a rig without
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
@@ -40,7 +40,7 @@ from coupled.gap.findings.hints import (
 )
 from coupled.gap.findings.judge import Judge
 from coupled.gap.findings.onefunction import by_one_function, needs_a_function
-from coupled.gap.findings.result import EffectResult, StageResult, Verdict
+from coupled.gap.findings.result import EffectResult, OtherCause, StageResult, Verdict
 from coupled.gap.findings.surfaceunit import in_other_unit
 from coupled.gap.findings.where import lone_channel
 from coupled.gap.prepare import Prepared, prepare
@@ -54,7 +54,7 @@ from coupled.gap.signals.reading import Reading
 from coupled.gap.stages.airframe import needs
 from coupled.gap.stages.surfaces import surface_points
 from coupled.gap.stages.tried import TERMS_OPTION, functions_tried, tried_effects, untried_terms
-from coupled.gap.thresholds import MOST, TINY
+from coupled.gap.thresholds import TINY
 from coupled.parallel import in_threads, threads
 from coupled.record.channels import CONTROL_NAMES, ControlName, channel
 from coupled.record.record import Record
@@ -338,35 +338,32 @@ def _answer(prepared: Prepared, case: Case, choice: Choice) -> _Answer:
 def _beside_other_causes(
     prepared: Prepared, case: Case, answer: _Answer
 ) -> tuple[tuple[EffectResult, ...], Verdict, list[str]]:
-    """Return effects and verdict beside what may cause the same and is no effect, and what it is.
-
-    This is the recorder, the other gear, the unit of a surface, whatever holds a loader still, a
-    steady sideslip, or a trim that was not measured.
-    """
+    """Return effects and verdict beside causes that are no effects, and these in words."""
     effects, verdict = answer.judged.effects, answer.judged.verdict
-    gear = None
-    if verdict != "no_gap":
-        gear = by_other_gear(case, answer.choice, prepared.own_records)
-    units = in_other_unit(case.nominal, effects)
-    shares = {one.name: MOST for one in effects if prepared.is_otherwise(one)}
-    shares |= dict.fromkeys(units, MOST)
-    words = list(dict.fromkeys(units.values()))
-    if gear is not None:
-        shares |= dict.fromkeys(gear.effects, gear.probability)
-        words.insert(0, gear.words)
-    if _is_faulty("loader", answer.judged.stages):
-        words.append(held_still(case.nominal, case.control, prepared.own_records))
-        loaders = [one.name for one in effects if one.stage == "loader"]
-        shares |= dict.fromkeys(loaders if words[-1] else (), MOST)
-    if slip := steady_sideslip(prepared.records, effects):
-        words.append(slip)
-        shares["sideslip_zero"] = MOST
+    causes = list(_other_causes(prepared, case, answer))
+    words = [one.words for one in causes]
     if _is_faulty(AIRFRAME, answer.judged.stages):
         words.append(unmeasured_trim(case.nominal, prepared.records))
+    shares = {name: one.probability for one in causes for name in one.effects}
     if not any(one.name in shares for one in effects):
         return effects, verdict, words
     less = (replace(e, probability=shares.get(e.name, 1.0) * e.probability) for e in effects)
     return tuple(less), "ambiguous" if verdict in ("effect", "mostly") else verdict, words
+
+
+def _other_causes(prepared: Prepared, case: Case, answer: _Answer) -> Iterator[OtherCause]:
+    """Yield the recorder or the air, units of surfaces, the gear, what holds a loader, sideslip."""
+    effects, records = answer.judged.effects, prepared.own_records
+    yield OtherCause(frozenset(one.name for one in effects if prepared.is_otherwise(one)))
+    yield from in_other_unit(case.nominal, effects)
+    if answer.judged.verdict != "no_gap":
+        gear = by_other_gear(case, answer.choice, records)
+        yield from [] if gear is None else [gear]
+    held = held_still(case.nominal, case.control, records)
+    if held and _is_faulty("loader", answer.judged.stages):
+        yield OtherCause(frozenset(e.name for e in effects if e.stage == "loader"), held)
+    if slip := steady_sideslip(prepared.records, effects):
+        yield OtherCause(frozenset(["sideslip_zero"]), slip)
 
 
 def _with_function(prepared: Prepared, case: Case, choice: Choice) -> tuple[Choice, _Judged]:

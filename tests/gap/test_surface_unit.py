@@ -38,16 +38,16 @@ def test_a_factor_of_the_size_of_another_unit_is_doubted(
 ) -> None:
     number = ParameterEstimate("factor", factor, 0.97 * factor, 1.03 * factor)
     found = in_other_unit(alone(), [EffectResult(f"{surface}_effectiveness", "", 0.9, (number,))])
-    assert set(found) == ({f"{surface}_effectiveness", f"{surface}_zero"} if unit else set())
-    assert all(one.startswith(f"{surface}_rad may be in {unit} instead") for one in found.values())
+    assert len(found) == bool(unit)
+    for one in found:
+        assert one.effects == {f"{surface}_effectiveness", f"{surface}_zero"}
+        assert one.words.startswith(f"{surface}_rad may be in {unit} instead")
 
 
 def test_an_effectiveness_that_may_be_none_shows_no_unit() -> None:
     """A log that starts in a manoeuvre had one of 0.01, -0.004 to 0.03: a surface in per cent."""
     number = ParameterEstimate("factor", 0.014, -0.004, 0.033)
-    assert (
-        in_other_unit(alone(), [EffectResult("elevator_effectiveness", "", 0.1, (number,))]) == {}
-    )
+    assert not in_other_unit(alone(), [EffectResult("elevator_effectiveness", "", 0.1, (number,))])
 
 
 @pytest.mark.slow

@@ -10,11 +10,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from coupled.errors import joined
 from coupled.gap.chain import AIRFRAME
 from coupled.gap.effects.effect import Effect
+from coupled.gap.findings.result import OtherCause
 from coupled.gap.search.case import Case
 from coupled.gap.search.evidence import Evidence, evidence, fewest_unexplained
 from coupled.gap.search.found import Choice
@@ -29,20 +30,7 @@ from coupled.rig.rig import Rig
 GEAR = "gear/gear-cmd-norm"
 
 
-@dataclass(frozen=True)
-class OtherGear:
-    """The other position of the gear in place of some effects, by their names.
-
-    `probability` is the effects' probability if only they and the gear are possible, `words` a
-    sentence for the summary.
-    """
-
-    effects: frozenset[str]
-    probability: float
-    words: str
-
-
-def by_other_gear(case: Case, choice: Choice, records: Collection[Record]) -> OtherGear | None:
+def by_other_gear(case: Case, choice: Choice, records: Collection[Record]) -> OtherCause | None:
     """Return the other position of the gear if it explains the airframe nearly as well, or better.
 
     None if a record's manifest states the trim, or if the model has no gear that moves.
@@ -64,7 +52,7 @@ def by_other_gear(case: Case, choice: Choice, records: Collection[Record]) -> Ot
         ahead = _ahead(replace(found, rest=found.rest - PRIOR_EFFECT), best)
         if ahead > -RIVAL_GAIN:
             probability = 1.0 / (1.0 + math.exp(min(ahead, 100.0)))
-            return OtherGear(removed, probability, _words(rig, removed, ahead > RIVAL_GAIN))
+            return OtherCause(removed, _words(rig, removed, ahead > RIVAL_GAIN), probability)
     return None
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from coupled.gap.findings.result import EffectResult
+from coupled.gap.findings.result import EffectResult, OtherCause
 from coupled.gap.stages.surfaces import surface_channel, surface_points
 from coupled.gap.thresholds import TINY
 from coupled.record.channels import CONTROL_NAMES, SURFACES, ControlName
@@ -16,12 +16,12 @@ from coupled.rig.rig import Rig
 from coupled.units import DEGREE_rad
 
 
-def in_other_unit(rig: Rig, effects: Sequence[EffectResult]) -> dict[str, str]:
-    """Return the effects that the unit of a surface may explain, by name, with a sentence.
+def in_other_unit(rig: Rig, effects: Sequence[EffectResult]) -> list[OtherCause]:
+    """Return the units of surfaces that may explain effects.
 
-    They are its effectiveness and, since a trim has the wrong unit too, its zero.
+    They are a surface's effectiveness and, since a trim has the wrong unit too, its zero.
     """
-    found = dict[str, str]()
+    found = list[OtherCause]()
     for control in CONTROL_NAMES if rig.flight is not None else ():
         surface = SURFACES[control]
         ours = [one for one in effects if one.name == f"{surface}_effectiveness"]
@@ -30,7 +30,7 @@ def in_other_unit(rig: Rig, effects: Sequence[EffectResult]) -> dict[str, str]:
                 f"{surface_channel(control)} may be in {unit} instead of rad, which acts like this "
                 f"{surface} effectiveness: check it, and set unit or scale in the import map."
             )
-            found |= dict.fromkeys((ours[0].name, f"{surface}_zero"), words)
+            found.append(OtherCause(frozenset((ours[0].name, f"{surface}_zero")), words))
     return found
 
 
