@@ -163,13 +163,14 @@ class Beam:
         return frozenset(effect.name for effect in fitted.effects if is_needed(effect))
 
     def _has_an_effect_within_noise(self, fitted: Fit) -> bool:
-        """Tell whether a library effect, beside others, improves only outputs within their noise.
+        """Tell whether a library effect improves only outputs within their noise.
 
         Noise that is not quite as modelled is explained by some effect (`_choose`). In the outputs
-        that are over their limits without the effect, it gains less than its prior penalty.
+        that are over their limits without the effect, it gains less than its prior penalty. Of one
+        effect alone, some output must be over its limit: else the answer is none (`_choose`).
         """
         names = names_of(fitted.effects)
-        if len(names) < 2 or not len(self.counts):
+        if not names or not len(self.counts):
             return False
         problem, variance = self.problem, self.error.variance
         smooth = self.error.smooth(self.counts)
@@ -184,6 +185,8 @@ class Beam:
                 rig = problem.within_tolerance(self.fits[rest]).rig
                 gaps = np.array([output.gap(rig) for output in problem.outputs])
             over = gaps > np.array([output.limit for output in problem.outputs])
+            if not rest and not over.any():
+                return False
             gains = 0.5 * self.counts * (misfit(gaps**2 / variance, smooth) - here)
             return float(gains[over].sum()) < PRIOR_EFFECT
 
