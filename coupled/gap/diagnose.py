@@ -31,17 +31,16 @@ from coupled.gap.findings.curves import Curves, find_curves
 from coupled.gap.findings.diagnosis import Diagnosis, PartDiagnosis, WholeDiagnosis
 from coupled.gap.findings.gear import by_other_gear
 from coupled.gap.findings.healthy import Baseline, beside_healthy
-from coupled.gap.findings.hints import (
-    held_still,
-    late_channels,
-    steady_sideslip,
-    still_surfaces,
-    unknown_conditions,
-)
+from coupled.gap.findings.hints import late_channels, still_surfaces, unknown_conditions
 from coupled.gap.findings.judge import Judge
 from coupled.gap.findings.onefunction import by_one_function, needs_a_function
-from coupled.gap.findings.result import EffectResult, OtherCause, StageResult, Verdict
-from coupled.gap.findings.surfaceunit import in_other_unit
+from coupled.gap.findings.othercauses import (
+    OtherCause,
+    held_still,
+    in_other_unit,
+    steady_sideslip,
+)
+from coupled.gap.findings.result import EffectResult, StageResult, Verdict
 from coupled.gap.findings.where import lone_channel
 from coupled.gap.prepare import Prepared, prepare
 from coupled.gap.search.case import Case, Tell

@@ -9,7 +9,7 @@ import pytest
 from coupled import load_rig
 from coupled.gap.diagnose import diagnose
 from coupled.gap.effects.library import BY_NAME
-from coupled.gap.findings.hints import held_still
+from coupled.gap.findings.othercauses import held_still
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
 from tests.support.gaps import know_only, made, nominal_rig

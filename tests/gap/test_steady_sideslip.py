@@ -9,7 +9,7 @@ import pytest
 
 from coupled.gap.diagnose import diagnose
 from coupled.gap.effects.library import BY_NAME
-from coupled.gap.findings.hints import steady_sideslip
+from coupled.gap.findings.othercauses import steady_sideslip
 from coupled.gap.findings.result import EffectResult
 from coupled.record.importing.convert import import_log
 from coupled.record.record import Record

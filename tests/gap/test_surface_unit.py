@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from coupled.gap.diagnose import diagnose
+from coupled.gap.findings.othercauses import in_other_unit
 from coupled.gap.findings.result import EffectResult, ParameterEstimate
-from coupled.gap.findings.surfaceunit import in_other_unit
 from coupled.record.importing.convert import import_log
 from coupled.record.record import Record
 from coupled.resources import shipped_rigs

@@ -15,7 +15,7 @@ from dataclasses import replace
 from coupled.errors import joined
 from coupled.gap.chain import AIRFRAME
 from coupled.gap.effects.effect import Effect
-from coupled.gap.findings.result import OtherCause
+from coupled.gap.findings.othercauses import OtherCause
 from coupled.gap.search.case import Case
 from coupled.gap.search.evidence import Evidence, evidence, fewest_unexplained
 from coupled.gap.search.found import Choice

@@ -1,24 +1,20 @@
-"""What to check in the channels of a record whose gap no effect explains, or not one alone."""
+"""What to check in a record whose gap no effect explains."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from coupled.errors import joined
-from coupled.flight.airframe import SPEED
 from coupled.gap.chain import AIRFRAME
-from coupled.gap.findings.result import EffectResult
-from coupled.gap.signals.output import TRIM, Output, estimate_noise, exceeds_noise
+from coupled.gap.signals.output import TRIM, Output
 from coupled.gap.stages.surfaces import states_trim, surface_channel
-from coupled.gap.thresholds import NEARLY_ALL, NEGLIGIBLE, TRIM_SIGMAS, BRIEF_s, WINDOW_s
-from coupled.record.channels import CONTROL_NAMES, ControlName, channel
+from coupled.gap.thresholds import NEARLY_ALL, WINDOW_s
+from coupled.record.channels import CONTROL_NAMES
 from coupled.record.levers import levers_of
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
-from coupled.units import GRAVITY_m_per_s2
 
 _POSITIONS = tuple(map(surface_channel, CONTROL_NAMES))
 
@@ -58,60 +54,6 @@ def still_surfaces(records: Sequence[Record]) -> str:
     still = [name for name, each in values.items() if each and not any(map(np.ptp, each))]
     verb = "never changes" if len(still) == 1 else "never change"
     return f"{joined(still)} {verb}: is a sensor stuck?" if still else ""
-
-
-def held_still(rig: Rig, control: ControlName, records: Sequence[Record]) -> str:
-    """Return a sentence on a loader that no force of the records moves; empty if one moves it.
-
-    Whatever holds it, friction, breakout or a stop, is then only known to exceed the force.
-    """
-    if not rests(rig, control, records):
-        return ""
-    most = max(float(np.max(np.abs(one[channel(control, "force")]))) for one in records)
-    return (
-        f"No force up to {most:.3g} N moves the loader of the {control}: friction, breakout, a stop"
-        " or a jam may hold it, and its size is only a lower bound. Record a force that moves it."
-    )
-
-
-def rests(rig: Rig, control: ControlName, records: Sequence[Record]) -> bool:
-    """Tell whether the computed deflection of a loader is noise alone in all records."""
-    names = channel(control, "computed"), channel(control, "force")
-    known = control in rig.controls and all(name in one for one in records for name in names)
-    if not known or rig.controls[control].drive != "force":
-        return False
-    return not any(exceeds_noise(one[names[0]]) for one in records)
-
-
-def steady_sideslip(records: Mapping[str, Record], effects: Sequence[EffectResult]) -> str:
-    """Return a sentence on a flight that starts in a sideslip, if its vane was found to be off.
-
-    The model starts without sideslip. In straight flight a side force balances a bank, as in a
-    sideslip; an offset of the vane leaves the wings level.
-    """
-    if not any(effect.name == "sideslip_zero" for effect in effects):
-        return ""
-    banks = {file: _unbalanced_bank_rad(one) for file, one in records.items()}
-    each = [f"{file} ({math.degrees(bank):.2g}°)" for file, bank in banks.items() if bank]
-    if not each:
-        return ""
-    return (
-        f"The wings are not level in the straight flight at the start of {joined(each)}, so the "
-        "sideslip may be real, as from a trim in wind. Give records that start without sideslip."
-    )
-
-
-def _unbalanced_bank_rad(record: Record) -> float:
-    """Return the bank at a record's start that no turn balances; 0 if it is within its error."""
-    names = ("roll_rad", "yaw_rate_rad_per_s", SPEED)
-    if any(name not in record for name in names):
-        return 0.0
-    rows = record.time_s < record.time_s[0] + BRIEF_s
-    roll, yaw_rate, speed = (record[name] for name in names)
-    bank = roll - speed * yaw_rate / GRAVITY_m_per_s2  # of a coordinated turn, at small angles
-    mean = float(np.mean(bank[rows]))
-    error = estimate_noise(bank).rms / math.sqrt(int(rows.sum()))
-    return mean if abs(mean) > max(TRIM_SIGMAS * error, NEGLIGIBLE) else 0.0
 
 
 def unknown_conditions(records: Sequence[Record]) -> str:

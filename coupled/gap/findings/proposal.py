@@ -24,7 +24,7 @@ from coupled.gap.effects.effect import Effect, apply, keys_of, possible, touched
 from coupled.gap.effects.library import EFFECTS
 from coupled.gap.effects.settings import settings
 from coupled.gap.findings.flown import fly_force
-from coupled.gap.findings.hints import rests
+from coupled.gap.findings.othercauses import rests
 from coupled.gap.findings.summary import plain
 from coupled.gap.noise.noise import rms_of
 from coupled.gap.search.case import Case

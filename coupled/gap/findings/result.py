@@ -23,7 +23,7 @@ from coupled.gap.findings.credibility import Credibility, remainder
 from coupled.gap.findings.where import Remains, Where
 from coupled.gap.search.course import Course
 from coupled.gap.signals.output import HiddenGap, explained_below
-from coupled.gap.thresholds import FAULTY_FROM, MOST
+from coupled.gap.thresholds import FAULTY_FROM
 from coupled.schema import Lenient, quantity, read_as
 
 # Of the JSON. A file without a format is read as one from before formats were numbered; a newer
@@ -43,18 +43,6 @@ def labelled(name: str, control: str | None) -> str:
 def placed(stage: str, control: str | None) -> str:
     """Return a stage's name among those of several controls; of one control, the stage's own."""
     return f"{control}.{stage}" if control else stage
-
-
-@dataclass(frozen=True)
-class OtherCause:
-    """What is no effect and may cause the same as some effects, by their names, and in words.
-
-    `probability` is that of the effects, if only they and this cause are possible.
-    """
-
-    effects: frozenset[str]
-    words: str = ""
-    probability: float = MOST
 
 
 @dataclass(frozen=True)
