@@ -189,12 +189,14 @@ def next_tests(
     """Return the tests that would discriminate the first alternatives found, the best first.
 
     They are forces up to the record's, which a bench that imposes the motion cannot apply, and
-    which do not move a loader that rests in the record.
+    which show nothing more of a loader that rests in the record.
     """
     step = next((step for step in choice.steps if step.rivals), None)
     if step is None or channel(control, "force") not in record:
         return ()
-    if nominal.controls[control].drive != "force" or rests(nominal, control, [record]):
+    if nominal.controls[control].drive != "force":
+        return ()
+    if step.effect.stage == "loader" and rests(nominal, control, [record]):
         return ()
     rival = step.rivals[0]
     others = tuple(effect for effect in choice.fit.effects if effect is not step.effect)
