@@ -76,6 +76,14 @@ def test_a_wheel_turns_ten_times_as_many_rad_as_a_column_moves_m(way: float) -> 
         assert wheel.high == pytest.approx(10.0**power * column.high)
 
 
+@pytest.mark.parametrize("way", [1e-3, 0.03, 1.0])
+def test_a_filed_bend_starts_near_its_own_size_whatever_the_motion(way: float) -> None:
+    """Of a record with brief pushes it started at 3e-6 m/N for 2e-4, and was not found."""
+    rig = machine(1.0)[0].changed({"controls.column.loader.bend_m_per_N": 8e-5})
+    (bend,) = in_scale([BY_NAME["bend"]], Scales(12.0, way, 0.3), rig, "column")
+    assert 4e-5 < bend.free[0].starts[0] < 1.6e-4
+
+
 @settings(deadline=None, max_examples=25)
 @given(LARGE)
 def test_starts_go_with_the_unit_of_force(force: float) -> None:

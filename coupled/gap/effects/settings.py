@@ -28,7 +28,15 @@ from coupled.gap.noise.noise import rms_of
 from coupled.gap.noise.smooth import rate_of, smoothed
 from coupled.gap.signals.output import Output
 from coupled.gap.signals.reading import Reading
-from coupled.gap.thresholds import COLUMN_FORCE_N, COLUMN_WAY, MINOR, OTHER_SCALE, CLOCK_s, YIELDS_m
+from coupled.gap.thresholds import (
+    COLUMN_FORCE_N,
+    COLUMN_WAY,
+    MINOR,
+    MOST,
+    OTHER_SCALE,
+    CLOCK_s,
+    YIELDS_m,
+)
 from coupled.record.channels import ControlName, motions_in, unit_of
 from coupled.rig.rig import Rig
 
@@ -252,7 +260,12 @@ def _scaled(p: Parameter, scales: Scales, rig: Rig, control: ControlName) -> Par
         low = min(low, -OTHER_SCALE * size) if low < 0.0 else low
     if (low, high, times) == (p.low, p.high, 1.0):
         return p
-    return replace(p, low=low, high=high, starts=tuple(times * start for start in p.starts))
+    starts = tuple(times * start for start in p.starts)
+    usual = Scales(COLUMN_FORCE_N, COLUMN_WAY[unit_of(control)], 1.0).times_columns(unit, control)
+    if times != usual and p.mode == "value" and not (p.above or p.is_limit):
+        filed = float(p.nominal(rig, control))  # of the size of this machine
+        starts = ((1.0 + MOST) * filed,) if filed > 0.0 else starts
+    return replace(p, low=low, high=high, starts=starts)
 
 
 def _powers(unit: str) -> tuple[float, ...] | None:
