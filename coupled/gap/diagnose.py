@@ -337,7 +337,7 @@ def _answer(prepared: Prepared, case: Case, choice: Choice) -> _Answer:
 def _beside_other_causes(
     prepared: Prepared, case: Case, answer: _Answer
 ) -> tuple[tuple[EffectResult, ...], Verdict, list[str]]:
-    """Return effects and verdict beside causes that are no effects, and these in words."""
+    """Return effects and verdict beside other causes, and a sentence on each cause."""
     effects, verdict = answer.judged.effects, answer.judged.verdict
     causes = list(_other_causes(prepared, case, answer))
     words = [one.words for one in causes]
@@ -351,7 +351,7 @@ def _beside_other_causes(
 
 
 def _other_causes(prepared: Prepared, case: Case, answer: _Answer) -> Iterator[OtherCause]:
-    """Yield the recorder or the air, units of surfaces, the gear, what holds a loader, sideslip."""
+    """Yield the causes that are no effects: recorder, air, units, gear, held loader, sideslip."""
     effects, records = answer.judged.effects, prepared.own_records
     yield OtherCause(frozenset(one.name for one in effects if prepared.is_otherwise(one)))
     yield from in_other_unit(case.nominal, effects)
@@ -366,7 +366,7 @@ def _other_causes(prepared: Prepared, case: Case, answer: _Answer) -> Iterator[O
 
 
 def _with_function(prepared: Prepared, case: Case, choice: Choice) -> tuple[Choice, _Judged]:
-    """Return a choice, or that of one function of the aircraft's model if it is likelier."""
+    """Return a choice, or the choice of one function of the model if it is likelier."""
     judged = _judged(prepared, case, choice)
     tried = any(effect.of for effect in prepared.library)
     if tried or not needs_a_function(case, choice, judged.effects):

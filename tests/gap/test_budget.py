@@ -45,7 +45,7 @@ def shares(found: Diagnosis, stage: str) -> dict[str, float]:
 def test_what_is_nearly_right_explains_most_and_says_what_remains(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Stribeck friction, held against Coulomb's alone: found to 6 %, and the rest described."""
+    """Coulomb friction approximates Stribeck friction to 6 %; the summary describes the rest."""
     nominal = nominal_rig(False)
     record = made(tmp_path, nominal, {"stribeck_friction": FRICTION}, 4)
     know_only(monkeypatch, [e for e in EFFECTS if e.name != "stribeck_friction"])

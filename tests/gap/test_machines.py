@@ -136,7 +136,7 @@ def test_a_damping_is_found_under_a_force_in_steps() -> None:
 
 
 def test_noise_that_hides_a_damping_between_restarts_is_no_proof_of_health() -> None:
-    """The floor was compared with the whole travel, of which a short replay predicts little."""
+    """The floor was compared with the whole travel; a short replay predicts far less motion."""
     found = diagnose(slider_rig(), {"r": hissing(2.0, 1.3)})
     stage = found.stage("loader").as_dict()
     assert (found.verdict, stage["judged"]) == ("ambiguous", False)

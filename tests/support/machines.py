@@ -193,8 +193,8 @@ def damper_rig(damping: float = 2000.0, drive: str = "displacement") -> Rig:
 def soft_damper(yields_m: float, friction_N: float = 600.0, rate_Hz: float = 100.0) -> Record:
     """Return a record of a damper with a soft spring and friction that yields, in imposed motion.
 
-    900 N·s/m and 1500 N/m. The friction is that of Bouc and Wen with n = 1 and β = γ: along a way s
-    it goes to its limit as exp(−s/yields), and back to zero as −s/yields.
+    900 N·s/m and 1500 N/m. The friction is a Bouc-Wen law with n = 1 and β = γ: along a way s it
+    goes to its limit as exp(−s/yields), and back to zero linearly, as −s/yields.
     """
     fine, seconds = 20, 12.0
     times = np.arange(round(seconds * rate_Hz) * fine) / (fine * rate_Hz)

@@ -147,7 +147,7 @@ class Comparison:
     """All features of some records tested against healthy ones.
 
     `shown` is the change of friction or offset in each stage, relative to the rms of its channel,
-    that would have been shown: of the one that is harder to detect, in the more sensitive signal.
+    that would have been shown: the larger of the two, each in its more sensitive signal.
     """
 
     healthy: int

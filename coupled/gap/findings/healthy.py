@@ -236,7 +236,7 @@ def beside_healthy(
 ) -> tuple[Verdict, tuple[StageResult, ...]]:
     """Return the verdict and the stages with what a comparison with healthy records shows.
 
-    `change` is that of the record beside its `effects`, `assumed` as in `Baseline`. A stage that
+    `change` compares the record beside its `effects`; `assumed` is as in `Baseline`. A stage that
     changed is faulty, unless it is one in which an effect or an unexplained fault shows. A stage
     whose floor hides a gap is judged by the comparison instead. No verdict is given where neither
     the comparison nor noise would have shown a change of a tenth.

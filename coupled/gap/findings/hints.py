@@ -57,7 +57,7 @@ def still_surfaces(records: Sequence[Record]) -> str:
 
 
 def unknown_conditions(records: Sequence[Record]) -> str:
-    """Return what of a flight no record shows, in words; empty if the flight was simulated."""
+    """Return a sentence on conditions that no record shows; empty if the flight was simulated."""
     if any(map(states_trim, records)):
         return ""
     recorded = {kind for one in records for kind, _ in levers_of(one.channels).values()}

@@ -1,11 +1,11 @@
-"""Whether one function of the aircraft's model explains what several effects were found for.
+"""Whether one function of the aircraft's model explains a gap better than the effects found.
 
-The library's effects change whole forces, and the derivatives of its table. JSBSim sums more
-functions: the drag at no lift, or the yawing moment of a roll rate. If one of them is wrong,
-several effects approximate it, each with an evidence far above its prior, or one whose size drifts.
-So if several effects of the airframe were found, or one that is not certain, or if its residual
-exceeds the noise, a factor on each function is fitted in their place, and compared with the best
-set by the log evidence.
+The library's effects change whole forces, and the usual derivatives. A JSBSim model has more
+functions: the drag at no lift, or the yawing moment due to a roll rate. If one function is wrong,
+several effects approximate it, each with an evidence far above its prior, or one effect whose size
+drifts. So if several effects of the airframe were found, or an uncertain effect, or if the residual
+exceeds the noise, a factor on each function is fitted in place of the effects. These fits are
+compared with the best set by log evidence.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def needs_a_function(case: Case, choice: Choice, effects: Sequence[EffectResult]
 def by_one_function(case: Case, choice: Choice, functions: Sequence[Effect]) -> Choice | None:
     """Return the choice of one function in place of the effects of the airframe.
 
-    None if no function explains the airframe, with a log evidence above that of the effects.
+    None if no function explains the airframe with more log evidence than the effects have.
     """
     problem, root = Problem(case), choice.without_effects
     kept = [one for one in choice.fit.effects if AIRFRAME not in one.shows_in]

@@ -1,4 +1,4 @@
-"""What is no effect and may cause the same as effects that were found.
+"""Causes that are no effects, and that may explain the same gap as the effects found.
 
 A position in shares of the full travel makes the model's surface move too far, by the inverse of
 its travel in radians, and a wrong effectiveness explains all of it. Simulators log both. A loader
@@ -28,9 +28,9 @@ from coupled.units import DEGREE_rad, GRAVITY_m_per_s2
 
 @dataclass(frozen=True)
 class OtherCause:
-    """What is no effect and may cause the same as some effects, by their names, and in words.
+    """A cause that is no effect, in words, and the names of the effects that it may replace.
 
-    `probability` is that of the effects, if only they and this cause are possible.
+    `probability` is the probability of these effects if only they and this cause are possible.
     """
 
     effects: frozenset[str]
@@ -82,7 +82,7 @@ def _units(rig: Rig, control: ControlName) -> Iterator[tuple[str, float, float]]
 def held_still(rig: Rig, control: ControlName, records: Sequence[Record]) -> str:
     """Return a sentence on a loader that no force of the records moves; empty if one moves it.
 
-    Whatever holds it, friction, breakout or a stop, is then only known to exceed the force.
+    Friction, breakout or a stop that holds the loader is then only known to exceed the force.
     """
     if not rests(rig, control, records):
         return ""

@@ -47,7 +47,7 @@ def _search_with_longer_contact(
 ) -> tuple[Case, Choice]:
     """Repeat the search with presliding up to the motion, if the largest length was found.
 
-    Other effects compensate for a contact that is too short. Return the likelier result.
+    Other effects compensate for a presliding length that is too short. Return the likelier result.
     """
     larger = case.with_longer_contact(found.fit)
     if larger is None:

@@ -293,7 +293,7 @@ class Reading:
     def in_series(self) -> bool:
         """Whether the record has F and δ without δc: loader and linkage are judged in series.
 
-        With imposed motion, only if a spring holds the loader: its force is most of that measured.
+        With imposed motion, only if a spring holds the loader and carries most of the force.
         """
         if self.set_points or self.name_of("computed") in self.record:
             return False
@@ -390,7 +390,7 @@ class Reading:
     def driving(self, quantity: str) -> Noise:
         """Return the noise of a control's channel as an input, without a broadband signal.
 
-        Of a signal that jumps often, as a torque held in steps, it is that between the jumps.
+        If the signal jumps often, as a torque held in steps, the noise between jumps counts.
         """
         estimated, signal = self.channel_noise(quantity), self._quiet(self.name_of(quantity))
         found = None if estimated.filtered else noise_of_input(signal)

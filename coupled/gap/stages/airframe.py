@@ -207,7 +207,7 @@ class Model:
 
     @property
     def law(self) -> Between:
-        """How the commands change between rows: the same of all flights of a record."""
+        """How the commands change between rows, in all flights of the record."""
         if self.flights.law is None:
             flight = self.rig.flight
             assert flight is not None
@@ -218,9 +218,9 @@ class Model:
     def _holds_commands(self) -> bool:
         """Tell whether the motion has the whole change that commands held over a row make.
 
-        A simulation may hold its commands from row to row. If they jump within the rows, the motion
-        has about half of that change. Its share is the projection of the residual on the change.
-        The motion may be stamped late or early by half a row, as its nuisance parameter.
+        A simulation may hold its commands from row to row. If the commands jump within the rows,
+        the motion has about half of this change. The share is the projection of the residual on the
+        change. The time stamps of the motion may be late or early by half a row.
         """
         measured = np.column_stack([self.record[name] for name in self.compared])
 

@@ -482,8 +482,8 @@ class Reader(Reading):
 def _between_restarts(output: Output, moves: float) -> Output:
     """Return an output whose floor is compared with the motion `moves`, rms, between restarts.
 
-    The motion over the whole record is far larger than that which a short replay predicts. 0: there
-    are no restarts.
+    The motion over the whole record is far larger than a short replay predicts. Without restarts
+    `moves` is 0.
     """
     if output.hidden_gap is None or moves <= 0.0:
         return output
